@@ -1,0 +1,62 @@
+# make help    what there is
+#
+# Needs Python 3.11 to 3.13, pip and make. The rest goes into .venv, once.
+
+SHELL := /bin/sh
+PYTHON ?= python3
+VENV := .venv
+STAMP := $(VENV)/.installed
+
+STEPS ?= 122880
+SEED ?= 0
+ifndef OUT
+OUT := runs/quickstart-$(shell date +%Y%m%d-%H%M%S)
+endif
+
+WORKERS ?= 2
+# One thread a worker: torch's own threads would only fight over the cores.
+PYTEST := OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n $(WORKERS) --dist loadfile
+
+.PHONY: help install quickstart check test test-slow clean
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+
+help:  ## this list
+	@sed -n 's/^\([a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do printf '  make %-12s %s\n' "$$name" "$$text"; done
+	@echo '  settings: PYTHON=python3.12  STEPS=122880  SEED=0  OUT=runs/NAME'
+
+install: $(STAMP)  ## make .venv with irl and its tools in it (the others do this by themselves)
+
+quickstart: $(STAMP)  ## demonstrations, GAIL on Hopper, evaluation and a report
+	$(VENV)/bin/irl demos generate --env-id Hopper-v5 --episodes 25 --seed 0
+	$(VENV)/bin/irl train gail --env-id Hopper-v5 --demos irl/hopper/expert-v0 --demo-episodes 4 --steps $(STEPS) --seed $(SEED) --out $(OUT)
+	$(VENV)/bin/irl evaluate $(OUT)
+
+check: $(STAMP)  ## format, lint, spelling, types, import direction
+	@scripts/check
+
+test: $(STAMP)  ## the tests, except those that learn for minutes
+	@$(PYTEST)
+
+test-slow: $(STAMP)  ## the tests that learn for minutes
+	@$(PYTEST) -m slow
+
+clean:  ## remove caches and builds; runs, datasets and .venv stay
+	rm -rf build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find irl tests scripts -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
+	  || { echo "irl needs Python 3.11, 3.12 or 3.13; '$(PYTHON)' is $$($(PYTHON) --version 2>&1 | tail -n 1). Name another: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@echo "Making $(VENV) with $$($(PYTHON) --version)"
+	@# Some distributions ship Python without ensurepip; the outside pip can fill the environment too.
+	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 \
+	  || { $(PYTHON) -m venv --clear --without-pip $(VENV) && $(PYTHON) -m pip --python $(VENV)/bin/python install -q pip; } \
+	  || { rm -rf $(VENV); echo "could not make $(VENV): '$(PYTHON)' needs its venv module, and pip" >&2; exit 1; }
+
+$(STAMP): pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "Installing irl and its tools into $(VENV) (once; minutes when torch must be fetched)"
+	@$(VENV)/bin/python -m pip install -q --disable-pip-version-check --no-input -c constraints.txt hatchling
+	@$(VENV)/bin/python -m pip install -q --disable-pip-version-check --no-input -c constraints.txt --no-build-isolation -e '.[dev]'
+	@touch $@
+	@echo "Installed"
