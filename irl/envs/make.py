@@ -1,0 +1,100 @@
+"""An environment by its id; what cannot be used is refused with one line that says what to type instead."""
+
+import difflib
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Box
+
+from irl.core.errors import UserError
+
+LIST_HINT = "; `python -c 'import gymnasium; gymnasium.pprint_registry()'` lists those there are"
+
+
+def make(env_id: str, **kwargs: Any) -> gym.Env:
+    """The Gymnasium environment called `env_id`, with a flat observation and a bounded flat action.
+
+    Args:
+        env_id: name and version, e.g. `Hopper-v5`; `module:Name-v0` imports `module` first.
+        kwargs: given on to the environment.
+
+    Raises:
+        UserError: no such environment, it cannot be built here, or its spaces cannot be used.
+    """
+    with warnings.catch_warnings(), _quiet_compiler():
+        # "out of date", "did you mean": said in our own words where it is a mistake
+        warnings.filterwarnings("ignore", message=r"(\x1b\[\d+m)?WARN: ")
+        try:
+            # an id without a version would be recorded under a name that is not the environment's
+            if env_id not in gym.registry and ":" not in env_id:
+                raise UserError(f"there is no environment {env_id!r}{_near(env_id) or LIST_HINT}")
+            env = gym.make(env_id, **kwargs)
+        except (gym.error.Error, ImportError, TypeError) as error:
+            raise UserError(f"cannot make {env_id!r}: {_one_line(error)}{_near(env_id)}") from error
+    try:
+        _check_spaces(env_id, env)
+    except UserError:
+        env.close()
+        raise
+    return env
+
+
+def near_ids(env_id: str, n: int = 3) -> list[str]:
+    """The newest versions of the `n` registered environments whose names resemble that of `env_id`."""
+    newest: dict[str, EnvSpec] = {}
+    for spec in gym.registry.values():
+        key = _bare(f"{spec.namespace or ''}{spec.name}")
+        if key not in newest or (spec.version or 0) > (newest[key].version or 0):
+            newest[key] = spec
+    wanted = _bare(re.sub(r"-?v?\d*$", "", env_id.rpartition(":")[2]))
+    close = difflib.get_close_matches(wanted, newest, n=n, cutoff=0.7)
+    return [newest[key].id for key in close]
+
+
+@contextmanager
+def _quiet_compiler() -> Iterator[None]:
+    """MuJoCo's compiler warnings as Python warnings, without the one about gymnasium's own models."""
+
+    def hear(message: str) -> None:
+        # half_cheetah.xml sets it; one line on stderr an environment, and nothing a user could mend
+        if "settotalmass" not in message:
+            warnings.warn(f"MuJoCo: {message.strip()}", stacklevel=2)
+
+    # the bindings have both, their type stubs lack them
+    get, put = (getattr(mujoco, f"{verb}_mju_user_warning") for verb in ("get", "set"))
+    before = get()
+    put(hear)
+    try:
+        yield
+    finally:
+        put(before)
+
+
+def _near(env_id: str) -> str:
+    near = [other for other in near_ids(env_id) if other != env_id]
+    return f"; near it: {', '.join(near)}" if near else ""
+
+
+def _bare(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split()).rstrip(".")
+
+
+def _check_spaces(env_id: str, env: gym.Env) -> None:
+    obs, action = env.observation_space, env.action_space
+    if not isinstance(obs, Box) or len(obs.shape) != 1:
+        raise UserError(f"{env_id} has the observations {obs}; expected a flat Box, e.g. Box of shape (11,)")
+    if not isinstance(action, Box) or len(action.shape) != 1:
+        raise UserError(f"{env_id} has the actions {action}; expected a flat Box, e.g. Box of shape (3,)")
+    if not (np.issubdtype(action.dtype, np.floating) and action.is_bounded()):
+        raise UserError(f"{env_id} has the actions {action}; expected real numbers with finite bounds")

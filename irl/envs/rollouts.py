@@ -1,0 +1,130 @@
+"""Episodes of a policy in an environment, with every number that the hand-written reward is made of."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from numbers import Real
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.spaces import Box
+from jaxtyping import Float
+
+from irl.core.types import ActFn, Episode
+from irl.envs.make import make
+from irl.envs.tasks import task_of
+
+
+def rollout(env: gym.Env, act: ActFn, seed: int) -> Episode:
+    """One episode of `act` in `env`, reset with `seed`; `env` stays open.
+
+    Actions are clipped to the bounds and rounded to the action space's dtype before the environment sees
+    them, so that the recorded action is the executed one. A task of `irl.envs.tasks` has its reward terms
+    and the row's infos recorded, another environment every scalar number that each step's info has.
+
+    Raises:
+        ValueError: an action has the wrong shape or is not finite.
+    """
+    return record(env, act, seed)[0]
+
+
+def record(env: gym.Env, act: ActFn, seed: int) -> tuple[Episode, dict[str, float]]:
+    """The episode of `rollout`, and the scalar numbers in the info of its reset (e.g. `x_position`)."""
+    space = env.action_space
+    assert isinstance(space, Box)
+    low, high, dtype = space.low, space.high, space.dtype
+    start, reset_info = env.reset(seed=seed)
+    # copies, here and below: an environment may return the same buffers at every step
+    at_reset = {key: float(value) for key, value in reset_info.items() if isinstance(value, Real)}
+    obs = [np.array(start, dtype=np.float64)]
+    actions, rewards, infos = [], [], []
+    terminated = truncated = False
+    while not (terminated or truncated):
+        wanted = np.asarray(act(obs[-1]), dtype=dtype)
+        if wanted.shape != low.shape:
+            raise ValueError(f"expected actions of shape {low.shape}, the policy gave {wanted.shape}")
+        action = np.minimum(np.maximum(wanted, low), high)
+        after, reward, terminated, truncated, info = env.step(action)
+        obs.append(np.array(after, dtype=np.float64))
+        actions.append(action)
+        rewards.append(reward)
+        infos.append(dict(info))
+    action_rows = np.array(actions)
+    if not np.isfinite(action_rows).all():
+        step = int(np.argmin(np.isfinite(action_rows).all(axis=1)))
+        raise ValueError(f"the policy gave the action {action_rows[step]} at step {step}")
+    terms, others = _named(env, _columns(infos))
+    episode = Episode(
+        obs=np.array(obs),
+        action=action_rows,
+        reward=np.array(rewards, dtype=np.float64),
+        terminated=bool(terminated),
+        truncated=bool(truncated),
+        terms=terms,
+        infos=others,
+        seed=seed,
+    )
+    return episode, at_reset
+
+
+def rollouts(
+    env_id: str,
+    act: ActFn,
+    seeds: Iterable[int],
+    on_episode: Callable[[Episode], None] | None = None,
+) -> list[Episode]:
+    """One episode of `act` a seed, in the order of `seeds`, in an environment made and closed here.
+
+    Args:
+        on_episode: called with each episode as it ends, e.g. to show progress.
+
+    Raises:
+        UserError: the environment cannot be made.
+        ValueError: an action has the wrong shape or is not finite.
+    """
+    env = make(env_id)
+    try:
+        episodes = []
+        for seed in seeds:
+            episodes.append(rollout(env, act, seed))
+            if on_episode is not None:
+                on_episode(episodes[-1])
+        return episodes
+    finally:
+        env.close()
+
+
+def random_act(action_space: gym.Space, rng: np.random.Generator) -> ActFn:
+    """The policy that draws every action uniformly within the bounds, from `rng`.
+
+    Raises:
+        ValueError: the action space is not a bounded Box.
+    """
+    if not isinstance(action_space, Box) or not action_space.is_bounded():
+        raise ValueError(f"expected a bounded Box of actions, got {action_space}")
+    low, high = action_space.low.astype(np.float64), action_space.high.astype(np.float64)
+
+    def act(obs: Float[np.ndarray, "O"]) -> Float[np.ndarray, "A"]:
+        return rng.uniform(low, high)
+
+    return act
+
+
+def _columns(infos: Sequence[Mapping[str, Any]]) -> dict[str, Float[np.ndarray, "T"]]:
+    """The scalar numbers that every step has, by `info` key."""
+    keys = [key for key, value in infos[0].items() if isinstance(value, Real)]
+    return {
+        key: np.array([info[key] for info in infos], dtype=np.float64)
+        for key in keys
+        if all(isinstance(info.get(key), Real) for info in infos)
+    }
+
+
+def _named(
+    env: gym.Env, columns: dict[str, Float[np.ndarray, "T"]]
+) -> tuple[dict[str, Float[np.ndarray, "T"]], dict[str, Float[np.ndarray, "T"]]]:
+    """Columns by term name, and the other ones worth keeping."""
+    task = task_of(env.spec.id) if env.spec is not None else None
+    if task is None or any(key not in columns for key in task.terms):
+        return {}, columns
+    terms = {name: columns[key] for key, name in task.terms.items()}
+    return terms, {key: columns[key] for key in task.infos if key in columns}
