@@ -1,0 +1,1 @@
+"""Demonstrations as Minari datasets: made, described and loaded. The only place that imports minari."""

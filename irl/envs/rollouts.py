@@ -48,14 +48,10 @@ def record(env: gym.Env, act: ActFn, seed: int) -> tuple[Episode, dict[str, floa
         actions.append(action)
         rewards.append(reward)
         infos.append(dict(info))
-    action_rows = np.array(actions)
-    if not np.isfinite(action_rows).all():
-        step = int(np.argmin(np.isfinite(action_rows).all(axis=1)))
-        raise ValueError(f"the policy gave the action {action_rows[step]} at step {step}")
     terms, others = _named(env, _columns(infos))
     episode = Episode(
         obs=np.array(obs),
-        action=action_rows,
+        action=_finite(np.array(actions)),
         reward=np.array(rewards, dtype=np.float64),
         terminated=bool(terminated),
         truncated=bool(truncated),
@@ -107,6 +103,15 @@ def random_act(action_space: gym.Space, rng: np.random.Generator) -> ActFn:
         return rng.uniform(low, high)
 
     return act
+
+
+def _finite(actions: Float[np.ndarray, "T A"]) -> Float[np.ndarray, "T A"]:
+    # once an episode: a check at every step would cost as much as the clipping
+    finite = np.isfinite(actions).all(axis=1)
+    if not finite.all():
+        step = int(np.argmin(finite))
+        raise ValueError(f"the policy gave the action {actions[step]} at step {step}")
+    return actions
 
 
 def _columns(infos: Sequence[Mapping[str, Any]]) -> dict[str, Float[np.ndarray, "T"]]:

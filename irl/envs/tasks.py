@@ -96,7 +96,7 @@ TASKS: tuple[Task, ...] = (
         "InvertedDoublePendulum-v5",
         ("reward_survive", "distance_penalty", "velocity_penalty"),
         (),
-        "the tip of the pole, which the angles and the cart's position determine; velocities beyond +-10",
+        "velocities beyond +-10, which velocity_penalty does not clip",
     ),
 )
 

@@ -1,0 +1,113 @@
+"""Demonstrations for training, and the rest of them for judging what was trained."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import overload
+
+import gymnasium as gym
+
+from irl.core.errors import UserError
+from irl.core.rng import stream
+from irl.core.types import Episode
+from irl.demos.storage import env_id_of, open_dataset, read_episodes
+from irl.envs.tasks import task_of
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Demos(Sequence[Episode]):
+    """The episodes drawn for training, as a sequence, and beside it those held out."""
+
+    episodes: tuple[Episode, ...]
+    held_out: tuple[Episode, ...]
+    indices: tuple[int, ...]
+    """Positions of `episodes` in the dataset, ascending."""
+    held_out_indices: tuple[int, ...]
+    dataset_id: str
+    env_id: str | None
+    path: Path
+    random_return: float | None
+    """Mean return of random actions, the zero of a normalised score."""
+    expert_return: float | None
+    """Mean return of the expert, the one of a normalised score."""
+
+    def __len__(self) -> int:
+        return len(self.episodes)
+
+    @overload
+    def __getitem__(self, index: int) -> Episode: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Episode, ...]: ...
+    def __getitem__(self, index: int | slice) -> Episode | tuple[Episode, ...]:
+        return self.episodes[index]
+
+    def __repr__(self) -> str:
+        steps = sum(len(episode) for episode in self.episodes)
+        return (
+            f"Demos({self.dataset_id}, {len(self)} episodes of {steps} steps, {len(self.held_out)} held out, "
+            f"env {self.env_id})"
+        )
+
+
+def load_demos(
+    dataset_id: str, *, episodes: int | None = None, seed: int = 0, root: Path | str | None = None
+) -> Demos:
+    """Demonstrations of a dataset: `episodes` of them drawn with `seed`, the rest held out.
+
+    With one seed, fewer episodes are a subset of more.
+
+    Args:
+        episodes: how many to train on; None takes all and holds none out.
+        seed: of the draw, from its stream "demos".
+        root: folder of the datasets; see `irl.demos.root.datasets_root` for what else is looked at.
+
+    Raises:
+        UserError: the dataset is not there or cannot be read, or has fewer episodes.
+    """
+    dataset = open_dataset(dataset_id, root)
+    n = dataset.total_episodes if episodes is None else episodes
+    if n < 1 or n > dataset.total_episodes:
+        raise UserError(
+            f"{n} demonstration episodes asked for, {dataset_id} has {dataset.total_episodes}; expected "
+            f"1 to {dataset.total_episodes}"
+        )
+    drawn = stream(seed, "demos").permutation(dataset.total_episodes)
+    chosen, rest = sorted(drawn[:n].tolist()), sorted(drawn[n:].tolist())
+    every = read_episodes(dataset)
+    metadata = dataset.storage.metadata
+    return Demos(
+        episodes=tuple(every[i] for i in chosen),
+        held_out=tuple(every[i] for i in rest),
+        indices=tuple(chosen),
+        held_out_indices=tuple(rest),
+        dataset_id=dataset_id,
+        env_id=env_id_of(dataset),
+        path=Path(str(dataset.storage.data_path)).parent,
+        random_return=metadata.get("ref_min_score"),
+        expert_return=metadata.get("ref_max_score"),
+    )
+
+
+def check_task(demos: Demos, env: gym.Env) -> None:
+    """Refuse demonstrations of another task than `env`'s.
+
+    Other shapes are always refused; equal ones where both tasks are known and differ, as Walker2d and
+    HalfCheetah.
+
+    Raises:
+        UserError: names both tasks and their shapes.
+    """
+    shown = demos.env_id or demos.dataset_id
+    wanted = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
+    has = demos[0].obs.shape[1], demos[0].action.shape[1]
+    needs = (env.observation_space.shape or (0,))[0], (env.action_space.shape or (0,))[0]
+    if has != needs:
+        raise UserError(
+            f"demonstrations of {shown} have observations of {has[0]} and actions of {has[1]}; "
+            f"{wanted} has {needs[0]} and {needs[1]}"
+        )
+    if shown != wanted and task_of(shown) is not None and task_of(wanted) is not None:
+        raise UserError(
+            f"demonstrations of {shown} are not of {wanted}, though both have observations of {has[0]} and "
+            f"actions of {has[1]}"
+        )
