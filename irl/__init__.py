@@ -1,0 +1,33 @@
+"""Imitation and adversarial reward learning: rewards from demonstrations, judged.
+
+>>> import irl
+>>> demos = irl.load_demos("irl/hopper/expert-v0", episodes=4, seed=0)    # doctest: +SKIP
+>>> reward = irl.load_reward("runs/quickstart")                           # doctest: +SKIP
+>>> reward(irl.from_episodes(demos.episodes)).mean()                      # doctest: +SKIP
+"""
+
+from irl.core.errors import UserError
+from irl.core.types import Episode, RewardFn, Transitions, concatenate, from_episodes
+from irl.demos.load import Demos, load_demos
+from irl.envs.rollouts import rollout, rollouts
+from irl.policies.policy import Policy, load_policy
+from irl.policies.shelf import find as load_expert
+from irl.rewards.artefact import LearnedReward, load_reward
+
+__all__ = [
+    "Demos",
+    "Episode",
+    "LearnedReward",
+    "Policy",
+    "RewardFn",
+    "Transitions",
+    "UserError",
+    "concatenate",
+    "from_episodes",
+    "load_demos",
+    "load_expert",
+    "load_policy",
+    "load_reward",
+    "rollout",
+    "rollouts",
+]

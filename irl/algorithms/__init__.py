@@ -1,0 +1,1 @@
+"""Training loops, and the steps a reward is judged on."""

@@ -7,7 +7,7 @@ An `Episode` holds numpy arrays as the simulator made them (float64); `Transitio
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import torch
@@ -43,9 +43,7 @@ class Episode:
         if steps == 0:
             raise ValueError("an episode has at least one step, this one has 0 actions")
         if len(self.obs) != steps + 1:
-            raise ValueError(
-                f"expected one more observation than actions: {len(self.obs)} != {steps} + 1"
-            )
+            raise ValueError(f"expected one more observation than actions: {len(self.obs)} != {steps} + 1")
         columns = {"reward": self.reward, **self.terms, **self.infos}
         for name, values in columns.items():
             if len(values) != steps:
@@ -84,9 +82,7 @@ class Transitions:
 
     def __post_init__(self) -> None:
         sizes = {
-            name: len(value)
-            for name, value in {**self._columns(), **self.terms}.items()
-            if value is not None
+            name: len(value) for name, value in {**self._columns(), **self.terms}.items() if value is not None
         }
         if len(set(sizes.values())) > 1:
             raise ValueError(f"expected columns of one length: {sizes}")
@@ -118,7 +114,7 @@ class Transitions:
         names = ("obs", "action", "next_obs", "terminated", "truncated", "reward")
         return {name: getattr(self, name) for name in names}
 
-    def _map(self, change) -> "Transitions":  # noqa: ANN001
+    def _map(self, change) -> "Transitions":
         columns = {k: None if v is None else change(v) for k, v in self._columns().items()}
         return Transitions(**columns, terms={k: change(v) for k, v in self.terms.items()})  # pyright: ignore[reportArgumentType]
 
@@ -171,12 +167,14 @@ def concatenate(batches: Sequence[Transitions]) -> Transitions:
     )
 
 
+@runtime_checkable
 class RewardFn(Protocol):
     """A reward of a batch: hand-written, shaped, normalised, learned or frozen, all the same."""
 
     def __call__(self, batch: Transitions) -> Float[Tensor, "B"]: ...
 
 
+@runtime_checkable
 class ActFn(Protocol):
     """A policy as rollouts need it: one observation in, one action in environment units out."""
 

@@ -1,0 +1,1 @@
+"""What a learned reward is worth: pure functions of reward arrays, rewards and episodes."""

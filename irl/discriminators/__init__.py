@@ -1,0 +1,1 @@
+"""What tells the expert from the policy: losses, regularisers, methods."""

@@ -1,0 +1,1 @@
+"""Exported policies, their cards, and the shelf of experts."""

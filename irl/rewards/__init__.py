@@ -1,0 +1,1 @@
+"""Rewards as functions of a batch: hand-written, learned, frozen."""

@@ -1,0 +1,105 @@
+"""Adversarial imitation: a discriminator and a learner take turns.
+
+each round:  batch  <- learner.collect()
+             D      <- minibatch steps on (expert, batch)
+             policy <- learner.improve(D.reward)
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import torch
+
+from irl.algorithms.loop import Learner, Round
+from irl.core.types import Metrics, Transitions
+
+
+@dataclass(frozen=True)
+class ScheduleConfig:
+    """How long the discriminator learns in each round."""
+
+    batch_size: int = 256
+    """Expert and policy transitions of one gradient step, each."""
+    warm_up_rounds: int = 5
+    """Rounds at the start in which it learns longer, so that the first rewards mean something."""
+    warm_up_epochs: int = 20
+    """Passes over each rollout in those rounds."""
+    epochs: int = 5
+    """Passes over each rollout afterwards."""
+
+    def epochs_at(self, index: int) -> int:
+        """Passes over the rollout of the round `index`, counted from 0."""
+        return self.warm_up_epochs if index < self.warm_up_rounds else self.epochs
+
+
+class Discriminator(Protocol):
+    """What tells the expert from the policy, and rewards the likeness."""
+
+    def logits(self, batch: Transitions) -> torch.Tensor: ...
+    def reward(self, batch: Transitions) -> torch.Tensor: ...
+    def update(self, expert: Transitions, policy: Transitions) -> Metrics: ...
+    def state_dict(self) -> dict[str, Any]: ...
+    def load_state_dict(self, state: dict[str, Any]) -> None: ...
+
+
+class Adversarial:
+    """The two players, and the demonstrations they meet over."""
+
+    def __init__(
+        self,
+        learner: Learner,
+        discriminator: Discriminator,
+        expert: Transitions,
+        schedule: ScheduleConfig,
+        rng: torch.Generator,
+    ) -> None:
+        """`rng` draws the discriminator's minibatches."""
+        self.learner, self.discriminator = learner, discriminator
+        self.expert, self.schedule, self.rng = expert, schedule, rng
+        self.index = 0
+
+    def rounds(self, steps: int) -> Iterator[Round]:
+        """Play until `steps` environment steps are taken; the last round may go past them."""
+        while self.learner.env_steps < steps:
+            batch = self.learner.collect()
+            # Discriminator first: the rollout is then rewarded by what was just fitted to it.
+            metrics = self._fit(batch)
+            metrics |= self.learner.improve(self.discriminator.reward)
+            self.index += 1
+            yield Round(self.index, self.learner.env_steps, metrics)
+
+    def _fit(self, policy: Transitions) -> Metrics:
+        updates = [
+            self.discriminator.update(self.expert.sample(len(batch), self.rng), batch)
+            for _ in range(self.schedule.epochs_at(self.index))
+            for batch in policy.minibatches(self.schedule.batch_size, self.rng)
+        ]
+        means = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]}
+        return means | self._judge(policy)
+
+    @torch.no_grad()
+    def _judge(self, policy: Transitions) -> Metrics:
+        expert, fresh = self.discriminator.logits(self.expert), self.discriminator.logits(policy)
+        return {
+            "discriminator/accuracy_expert": float((expert > 0).double().mean()),
+            "discriminator/accuracy_policy": float((fresh < 0).double().mean()),
+            "discriminator/logit_expert": float(expert.mean()),
+            "discriminator/logit_policy": float(fresh.mean()),
+        }
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything needed to go on, between two rounds."""
+        return {
+            "learner": self.learner.state_dict(),
+            "discriminator": self.discriminator.state_dict(),
+            "rng": self.rng.get_state(),
+            "index": self.index,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go on where another run of the same settings was."""
+        self.learner.load_state_dict(state["learner"])
+        self.discriminator.load_state_dict(state["discriminator"])
+        self.rng.set_state(state["rng"])
+        self.index = state["index"]

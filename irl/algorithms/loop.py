@@ -1,0 +1,34 @@
+"""What every training loop shares: the record of a round, and what a learner can do."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from irl.core.types import Metrics, RewardFn, Transitions
+from irl.policies.policy import Policy
+
+
+@dataclass(frozen=True)
+class Round:
+    """What one round did. The loop emits it; whoever writes, draws or evaluates listens."""
+
+    index: int
+    """Counted from 1."""
+    env_steps: int
+    """Environment steps taken since the start of the run, this round included."""
+    metrics: Metrics
+
+
+class Learner(Protocol):
+    """What improves a policy: collects steps, is told their reward, learns from it."""
+
+    @property
+    def env_steps(self) -> int: ...
+    @property
+    def reward_scale(self) -> float: ...
+    def collect(self) -> Transitions: ...
+    def improve(self, reward: RewardFn) -> Metrics: ...
+    def take_finished(self) -> list[tuple[float, int]]: ...
+    def policy(self) -> Policy: ...
+    def state_dict(self) -> dict[str, Any]: ...
+    def load_state_dict(self, state: dict[str, Any]) -> None: ...
+    def close(self) -> None: ...

@@ -1,0 +1,85 @@
+"""Frozen dataclasses to JSON and back, with a `kind` wherever there is a choice.
+
+`dataclasses.asdict` forgets which member of a union was chosen; a class that is a choice says so with a
+`KIND: ClassVar[str]`, which is written as "kind" and decides on the way back.
+"""
+
+import types
+import typing
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+
+from irl.core.errors import UserError
+
+
+def to_json(config: Any) -> Any:
+    """The config as JSON values."""
+    if is_dataclass(config):
+        content = {field.name: to_json(getattr(config, field.name)) for field in fields(config)}
+        kind = getattr(config, "KIND", None)
+        return {"kind": kind, **content} if kind else content
+    if isinstance(config, tuple | list):
+        return [to_json(item) for item in config]
+    if isinstance(config, dict):
+        return {key: to_json(value) for key, value in config.items()}
+    return str(config) if isinstance(config, Path) else config
+
+
+def from_json(cls: Any, content: Any, where: str = "config") -> Any:
+    """The value of type `cls` that `to_json` wrote as `content`.
+
+    Raises:
+        UserError: a key is unknown or missing, a kind is unknown, or a value has the wrong type.
+    """
+    if isinstance(cls, type) and is_dataclass(cls):
+        return _dataclass(cls, content, where)
+    origin, arguments = get_origin(cls), get_args(cls)
+    if origin in (typing.Union, types.UnionType):
+        return _union(arguments, content, where)
+    if origin is typing.Literal and content in arguments:
+        return content
+    if origin is tuple and isinstance(content, list):
+        return tuple(from_json(arguments[0], item, f"{where}[{i}]") for i, item in enumerate(content))
+    if origin is dict and isinstance(content, dict):
+        return content
+    if cls is Path and isinstance(content, str):
+        return Path(content)
+    if cls is float and isinstance(content, int) and not isinstance(content, bool):
+        return float(content)
+    if cls in (bool, int, float, str) and type(content) is cls:
+        return content
+    expected = ", ".join(map(repr, arguments)) if origin is typing.Literal else getattr(cls, "__name__", cls)
+    raise UserError(f"{where}: expected {expected}, found {content!r}")
+
+
+def _dataclass(cls: type, content: Any, where: str) -> Any:
+    if not isinstance(content, dict):
+        raise UserError(f"{where}: expected the settings of {cls.__name__}, found {content!r}")
+    given, kind = dict(content), getattr(cls, "KIND", None)
+    if kind and given.pop("kind", kind) != kind:
+        raise UserError(f"{where}: expected kind {kind!r}, found {content['kind']!r}")
+    hints = get_type_hints(cls)
+    names = [field.name for field in fields(cls)]
+    if unknown := sorted(set(given) - set(names)):
+        raise UserError(f"{where}: unknown {', '.join(unknown)}; known: {', '.join(names)}")
+    if missing := [name for name in names if name not in given]:
+        raise UserError(f"{where}: missing {', '.join(missing)}")
+    values = {name: from_json(hints[name], given[name], f"{where}.{name}") for name in names}
+    try:
+        return cls(**values)
+    except ValueError as error:
+        raise UserError(f"{where}: {error}") from error
+
+
+def _union(members: tuple[Any, ...], content: Any, where: str) -> Any:
+    if content is None and type(None) in members:
+        return None
+    members = tuple(member for member in members if member is not type(None))
+    if len(members) == 1:
+        return from_json(members[0], content, where)
+    kinds = {member.KIND: member for member in members}
+    kind = content.get("kind") if isinstance(content, dict) else None
+    if kind not in kinds:
+        raise UserError(f"{where}: kind is one of {', '.join(kinds)}, found {kind!r}")
+    return from_json(kinds[kind], content, where)

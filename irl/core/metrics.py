@@ -1,0 +1,31 @@
+"""Every number a run records, declared once: its meaning and its unit.
+
+A run folder refuses a name that is not here, so a curve is never without an explanation.
+"""
+
+DECLARED: dict[str, tuple[str, str]] = {
+    "round": ("rounds of the loop, counted from 1", "rounds"),
+    "env_steps": ("environment steps taken so far, over all environments", "steps"),
+    "wall_s": ("time since the run began, pauses between resumes left out", "s"),
+    "return_mean": ("mean return of the last 20 training episodes, the environment's own reward", "reward"),
+    "length_mean": ("mean length of the last 20 training episodes", "steps"),
+    "eval_return_mean": ("mean return of the deterministic policy in its own episodes", "reward"),
+    "eval_length_mean": ("mean length of those episodes", "steps"),
+    "reward/mean": ("mean of the reward given to the learner, before scaling", "reward"),
+    "reward/std": ("its standard deviation over the rollout", "reward"),
+    "reward/scale": ("running standard deviation of its discounted return, which it is divided by", "reward"),
+    "discriminator/loss": (
+        "binary cross-entropy on both classes, mean over the round; log 4 is blind",
+        "nats",
+    ),
+    "discriminator/gradient_penalty": ("penalty before its weight, mean over the round", "1"),
+    "discriminator/accuracy_expert": ("share of demonstration steps called expert, at the round's end", "1"),
+    "discriminator/accuracy_policy": ("share of this rollout's steps called policy, at the round's end", "1"),
+    "discriminator/logit_expert": ("mean logit of the demonstrations, at the round's end", "nats"),
+    "discriminator/logit_policy": ("mean logit of this rollout, at the round's end", "nats"),
+    "ppo/approx_kl": ("divergence of the old policy from the new one, mean over the round", "nats"),
+    "ppo/clip_fraction": ("share of probability ratios beyond the clip range", "1"),
+    "ppo/value_loss": ("squared error of the value, scaled reward", "1"),
+    "ppo/explained_variance": ("share of the return's variance that the value explains", "1"),
+    "ppo/std": ("standard deviation of the actions, mean over their dimensions", "action"),
+}

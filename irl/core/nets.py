@@ -1,0 +1,93 @@
+"""Multi-layer perceptrons and the observation normaliser.
+
+    mlp:         x -> W_n act(... act(W_1 x + b_1) ...) + b_n
+    normaliser:  x -> clip((x - mean) / std, -10, 10)
+
+Weights are drawn from a generator that the caller hands in, never from the global stream.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
+
+CLIP = 10.0
+"""Bound of a normalised observation, in standard deviations."""
+
+MIN_STD = 1e-6
+"""An observation that varies less is constant, and is only centred: its noise says nothing."""
+
+
+def linear(inputs: int, outputs: int, generator: torch.Generator) -> nn.Linear:
+    """A linear layer with weights and biases uniform in +-1/sqrt(inputs), as torch's own default."""
+    layer = nn.utils.skip_init(nn.Linear, inputs, outputs)
+    assert isinstance(layer, nn.Linear)
+    bound = 1.0 / math.sqrt(inputs)
+    nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
+    nn.init.uniform_(layer.bias, -bound, bound, generator=generator)
+    return layer
+
+
+def mlp(sizes: Sequence[int], activation: str, generator: torch.Generator) -> nn.Sequential:
+    """A perceptron through `sizes` (inputs first, outputs last) with no activation at its end.
+
+    Raises:
+        KeyError: the activation is none of `ACTIVATIONS`.
+    """
+    layers: list[nn.Module] = []
+    for inputs, outputs in itertools.pairwise(sizes):
+        layers += [linear(inputs, outputs, generator), ACTIVATIONS[activation]()]
+    return nn.Sequential(*layers[:-1])
+
+
+class Normaliser(nn.Module):
+    """Observations in standard deviations from their mean, clipped at +-10.
+
+    Fixed unless `update` is called, which merges a batch into the running moments.
+    """
+
+    mean: Tensor
+    var: Tensor
+    count: Tensor
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(size))
+        self.register_buffer("var", torch.ones(size))
+        self.register_buffer("count", torch.zeros((), dtype=torch.float64))
+
+    @property
+    def std(self) -> Float[Tensor, "O"]:
+        """Standard deviations; 1 where the observation is constant."""
+        std = self.var.sqrt()
+        return torch.where(std < MIN_STD, torch.ones_like(std), std)
+
+    def forward(self, obs: Float[Tensor, "B O"]) -> Float[Tensor, "B O"]:
+        return ((obs - self.mean) / self.std).clamp(-CLIP, CLIP)
+
+    @torch.no_grad()
+    def update(self, obs: Float[Tensor, "B O"]) -> None:
+        """Merge a batch into mean and variance (population moments, parallel form).
+
+        Source: Chan, Golub & LeVeque (1979), equations 2.1a and 2.1b.
+        """
+        batch = obs.double()
+        size, total = len(batch), self.count + len(batch)
+        delta = batch.mean(0) - self.mean.double()
+        squares = self.var.double() * self.count + batch.var(0, unbiased=False) * size
+        squares += delta.square() * self.count * size / total
+        self.mean.copy_(self.mean.double() + delta * size / total)
+        self.var.copy_(squares / total)
+        self.count.copy_(total)
+
+
+def fitted_normaliser(obs: Float[Tensor, "B O"]) -> Normaliser:
+    """A normaliser with the moments of `obs`, e.g. of the demonstrations."""
+    normaliser = Normaliser(obs.shape[1])
+    normaliser.update(obs)
+    return normaliser

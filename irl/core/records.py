@@ -1,0 +1,129 @@
+"""The run folder: everything a run writes, in files that other tools can read.
+
+config.json  environment.json  metrics.jsonl  tensorboard/  snapshots/<steps>/  checkpoint/<steps>/
+evaluation.json  report.html
+"""
+
+import json
+import math
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from irl.core import files, state
+from irl.core.errors import UserError
+from irl.core.metrics import DECLARED
+
+KEPT_CHECKPOINTS = 2
+
+
+class RunFolder:
+    """One run on disk. Make one with `create`, come back to one with `open_run`."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def config(self) -> dict[str, Any]:
+        """What `config.json` holds."""
+        return files.read_json(self.path / "config.json")
+
+    def metrics(self) -> list[dict[str, Any]]:
+        """Every complete line of `metrics.jsonl`; a last line that was cut off is not one."""
+        path = self.path / "metrics.jsonl"
+        rows = []
+        for line in path.read_text().splitlines() if path.is_file() else []:
+            try:
+                rows.append(json.loads(line))
+            except json.JSONDecodeError:
+                break
+        return rows
+
+    def append(self, row: Mapping[str, float | None]) -> None:
+        """Add a line to `metrics.jsonl`; a number that is not finite is written as null.
+
+        Raises:
+            KeyError: a name is not declared in `core.metrics`.
+        """
+        if unknown := sorted(set(row) - set(DECLARED)):
+            raise KeyError(f"undeclared metrics {unknown}: declare them in irl.core.metrics")
+        clean = {k: v if v is not None and math.isfinite(v) else None for k, v in row.items()}
+        with (self.path / "metrics.jsonl").open("a") as file:
+            file.write(json.dumps(clean) + "\n")
+
+    def forget_rounds_after(self, index: int) -> None:
+        """Drop the lines of rounds that a resumed run will write again."""
+        kept = [json.dumps(row) + "\n" for row in self.metrics() if row["round"] <= index]
+        files.write_bytes(self.path / "metrics.jsonl", "".join(kept).encode())
+
+    @contextmanager
+    def snapshot(self, env_steps: int) -> Iterator[Path]:
+        """A folder to fill for this step; it appears when it is complete."""
+        with files.new_folder(self.path / "snapshots" / f"{env_steps:09d}") as folder:
+            yield folder
+
+    def snapshots(self) -> dict[int, Path]:
+        """Every snapshot by its environment steps, in order."""
+        return _by_steps(self.path / "snapshots")
+
+    def save_checkpoint(self, env_steps: int, content: Any) -> None:
+        """Write a checkpoint, then drop all but the newest two."""
+        root = self.path / "checkpoint"
+        with files.new_folder(root / f"{env_steps:09d}") as folder:
+            state.save(folder, content)
+        for old in list(_by_steps(root).values())[:-KEPT_CHECKPOINTS]:
+            shutil.rmtree(old)
+
+    def load_checkpoint(self) -> Any | None:
+        """The newest checkpoint, None when there is none.
+
+        Raises:
+            UserError: it is damaged.
+        """
+        found = list(_by_steps(self.path / "checkpoint").values())
+        return state.load(found[-1]) if found else None
+
+
+def create(path: Path, config: Mapping[str, Any], environment: Mapping[str, Any]) -> RunFolder:
+    """A new run folder that says what it will do.
+
+    Raises:
+        UserError: the folder holds something already.
+    """
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        what = "a run" if (path / "config.json").is_file() else "other files"
+        more = f", or go on with it: irl train --resume {path}" if what == "a run" else ""
+        raise UserError(f"{path} already holds {what}; choose another folder with --out{more}")
+    path.mkdir(parents=True, exist_ok=True)
+    files.write_json(path / "environment.json", environment)
+    files.write_json(path / "config.json", config)
+    return RunFolder(path)
+
+
+def open_run(path: Path) -> RunFolder:
+    """The run in a folder.
+
+    Raises:
+        UserError: there is none.
+    """
+    if not (path / "config.json").is_file():
+        raise UserError(f"{path} holds no run: there is no {path / 'config.json'}")
+    return RunFolder(path)
+
+
+def snapshot_steps(total: int, halvings: int = 6) -> list[int]:
+    """When to take a snapshot: the start, total / 2^k for k = 6..0, and every quarter.
+
+    >>> snapshot_steps(128, halvings=3)
+    [0, 16, 32, 64, 96, 128]
+    """
+    logarithmic = {total // 2**k for k in range(halvings + 1)}
+    quarters = {total * k // 4 for k in range(5)}
+    return sorted(logarithmic | quarters)
+
+
+def _by_steps(root: Path) -> dict[int, Path]:
+    found = [path for path in root.glob("*") if path.name.isdecimal()]
+    return {int(path.name): path for path in sorted(found, key=lambda path: int(path.name))}

@@ -1,0 +1,71 @@
+"""How two columns of numbers agree, and how well a number separates two groups.
+
+Undefined is NaN, never 0: a correlation with a constant is not "no correlation". No function here
+warns, and every one takes its averages in float64.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import rankdata
+
+ROUNDING = 1e-13
+"""A spread below this share of the largest magnitude is what summing terms in float64 leaves."""
+
+
+def is_constant(values: Float[np.ndarray, "N"]) -> bool:
+    """Whether all values are one number, up to the rounding of a sum; so are none and one."""
+    if len(values) < 2:
+        return True
+    return bool(np.ptp(values) <= ROUNDING * np.max(np.abs(values)))
+
+
+def pearson(a: Float[np.ndarray, "N"], b: Float[np.ndarray, "N"]) -> float:
+    """Linear correlation, in [-1, 1].
+
+        rho = sum((a - mean(a)) (b - mean(b))) / (|a - mean(a)| |b - mean(b)|)
+
+    NaN where either is constant or holds a number that is not finite.
+    """
+    if not _comparable(a, b):
+        return float("nan")
+    x, y = _direction(a), _direction(b)
+    return float(np.clip(np.dot(x, y), -1.0, 1.0))
+
+
+def spearman(a: Float[np.ndarray, "N"], b: Float[np.ndarray, "N"]) -> float:
+    """Correlation of the ranks, in [-1, 1]; equal values share the average of their ranks.
+
+    NaN where either is constant or holds a number that is not finite.
+    """
+    if not _comparable(a, b):
+        return float("nan")
+    return pearson(rankdata(a), rankdata(b))
+
+
+def auroc(positive: Float[np.ndarray, "P"], negative: Float[np.ndarray, "N"]) -> float:
+    """Probability that a positive outranks a negative one, ties counted half: 0.5 = no separation.
+
+        A = (sum of the ranks of the positive - P (P + 1) / 2) / (P N)        (Mann-Whitney's U / P N)
+
+    NaN where either is empty or holds a number that is not finite.
+    """
+    n_positive, n_negative = len(positive), len(negative)
+    both = np.concatenate([positive, negative]).astype(np.float64)
+    if n_positive == 0 or n_negative == 0 or not np.all(np.isfinite(both)):
+        return float("nan")
+    rank_sum = float(np.sum(rankdata(both)[:n_positive]))
+    return (rank_sum - n_positive * (n_positive + 1) / 2) / (n_positive * n_negative)
+
+
+def _comparable(a: Float[np.ndarray, "N"], b: Float[np.ndarray, "N"]) -> bool:
+    finite = np.all(np.isfinite(a)) and np.all(np.isfinite(b))
+    return bool(finite) and not is_constant(a) and not is_constant(b)
+
+
+def _direction(values: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
+    # dividing before centring keeps the squares of very large and very small numbers finite
+    scaled = np.asarray(values, dtype=np.float64)
+    scaled = scaled / np.max(np.abs(scaled))
+    centred = scaled - np.mean(scaled)
+    centred = centred / np.max(np.abs(centred))
+    return centred / np.linalg.norm(centred)

@@ -1,0 +1,72 @@
+"""The command line: one table of commands, each a frozen dataclass that tyro reads."""
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import tyro
+from rich.console import Console
+
+from irl.core.errors import UserError
+from irl.experiment import demonstrations, evaluate, experts, train
+from irl.experiment.configs import GAILRun
+from irl.experiment.play import Interrupted
+
+Run = Callable[[Any], None]
+
+COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
+    ("demos", "generate"): (demonstrations.GenerateDemos, demonstrations.generate_demos),
+    ("demos", "show"): (demonstrations.ShowDemos, demonstrations.show_demos),
+    ("demos", "list"): (demonstrations.ListDemos, demonstrations.list_demos),
+    ("train", "gail"): (GAILRun, train.train_gail),
+    ("train",): (train.Resume, train.go_on),
+    ("evaluate",): (evaluate.Evaluate, evaluate.evaluate),
+    ("experts", "train"): (experts.TrainExpert, experts.train),
+    ("experts", "evaluate"): (experts.EvaluateExpert, experts.evaluate),
+    ("experts", "list"): (experts.ListExperts, experts.list_experts),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run one command; a user's mistake is one line on stderr and exit status 2."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in words
+    words = [word for word in words if word != "--debug"]
+    try:
+        _dispatch(words)
+    except UserError as error:
+        if debug:
+            raise
+        _fail(str(error))
+    except Interrupted:
+        raise SystemExit(130) from None
+
+
+def _dispatch(words: list[str]) -> None:
+    for n in (2, 1):
+        if (name := tuple(words[:n])) in COMMANDS and len(name) == n:
+            cls, run = COMMANDS[name]
+            try:
+                command = tyro.cli(cls, args=words[n:], prog=f"irl {' '.join(name)}")
+            except ValueError as error:
+                raise UserError(str(error)) from error
+            run(command)
+            return
+    _overview(words)
+
+
+def _overview(words: list[str]) -> None:
+    near = [name for name in COMMANDS if name[: len(words)] == tuple(words)]
+    asked = [word for word in words if not word.startswith("-")]
+    if asked and not near:
+        known = ", ".join(" ".join(name) for name in COMMANDS)
+        raise UserError(f"no command 'irl {' '.join(asked)}'; there are: {known}")
+    console = Console()
+    for name in near or list(COMMANDS):
+        first = (COMMANDS[name][0].__doc__ or "").splitlines()[0]
+        console.print(f"  irl {' '.join(name):<18} {first}", highlight=False)
+
+
+def _fail(message: str) -> None:
+    print(f"irl: {' '.join(message.split())}", file=sys.stderr)
+    raise SystemExit(2)

@@ -1,0 +1,25 @@
+"""Curves for TensorBoard, in the run folder's tensorboard/."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def curves(run: Path, write: bool = True) -> Iterator[Callable[[Mapping[str, float | None]], None]]:
+    """A function that adds a row of metrics to the curves; does nothing unless `write`."""
+    if not write:
+        yield lambda row: None
+        return
+    from torch.utils.tensorboard import SummaryWriter  # a second to import, and often not wanted
+
+    with SummaryWriter(str(run / "tensorboard")) as writer:
+
+        def draw(row: Mapping[str, float | None]) -> None:
+            steps = row["env_steps"]
+            assert steps is not None
+            for name, value in row.items():
+                if value is not None and name not in ("round", "env_steps"):
+                    writer.add_scalar(name, value, int(steps))
+
+        yield draw

@@ -1,0 +1,122 @@
+"""`irl demos`: make, show and list demonstrations."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from irl.core.errors import UserError
+from irl.core.rng import episode_seeds
+from irl.demos.generate import generate
+from irl.demos.info import DemosInfo, show
+from irl.demos.root import datasets_root
+from irl.demos.storage import list_datasets
+from irl.envs.make import make
+from irl.envs.tasks import task_name
+from irl.experiment.progress import progress
+from irl.policies import shelf
+
+
+@dataclass(frozen=True)
+class GenerateDemos:
+    """Record episodes of a shelved policy as a Minari dataset, with every reward term."""
+
+    env_id: str
+    """Gymnasium id of the task."""
+    episodes: int = 25
+    """How many episodes."""
+    seed: int = 0
+    """Draws the episodes' resets; the same seed gives the same arrays."""
+    level: str = "expert"
+    """Which policy of the shelf acts."""
+    dataset_id: str = ""
+    """Name of the dataset; irl/<task>/<level>-v0 unless given."""
+    datasets_root: Path | None = None
+    """Folder of Minari datasets; MINARI_DATASETS_PATH, or expert_data/datasets, unless given."""
+    policies_root: Path | None = None
+    """Where the shelf is; expert_data/policies unless given."""
+    overwrite: bool = False
+    """Replace a dataset of this name."""
+
+
+@dataclass(frozen=True)
+class ShowDemos:
+    """Describe a dataset: episodes, steps, returns, terms, size."""
+
+    dataset_id: tyro.conf.Positional[str]
+    """Name of the dataset."""
+    datasets_root: Path | None = None
+    """Folder of Minari datasets."""
+
+
+@dataclass(frozen=True)
+class ListDemos:
+    """List the datasets there are."""
+
+    datasets_root: Path | None = None
+    """Folder of Minari datasets."""
+
+
+def generate_demos(command: GenerateDemos) -> None:
+    """Record the episodes and describe the dataset."""
+    if command.episodes < 1:
+        raise UserError(f"--episodes must be at least 1, not {command.episodes}")
+    make(command.env_id).close()
+    expert = shelf.find(command.env_id, command.level, command.policies_root)
+    dataset_id = command.dataset_id or f"irl/{task_name(command.env_id)}/{command.level}-v0"
+    with progress(dataset_id, command.episodes) as report:
+        done = iter(range(1, command.episodes + 1))
+        info = generate(
+            command.env_id,
+            expert.policy,
+            dataset_id=dataset_id,
+            root=command.datasets_root,
+            seeds=episode_seeds(command.seed, "demonstrations", command.episodes),
+            algorithm=expert.card.algorithm,
+            author="irl",
+            random_return=expert.card.random_return_mean,
+            expert_return=expert.card.measured.return_mean,
+            description=f"{command.level} of {command.env_id}, deterministic actions, seed {command.seed}",
+            on_episode=lambda episode: report(next(done), f"return {episode.return_:.0f}"),
+            overwrite=command.overwrite,
+        )
+    Console().print(_table(info))
+
+
+def show_demos(command: ShowDemos) -> None:
+    """Print what a dataset holds."""
+    Console().print(_table(show(command.dataset_id, command.datasets_root)))
+
+
+def list_demos(command: ListDemos) -> None:
+    """Print the names of the datasets."""
+    names = list_datasets(command.datasets_root)
+    if not names:
+        where = datasets_root(command.datasets_root)
+        raise UserError(f"no datasets in {where}; make one with: irl demos generate --env-id Hopper-v5")
+    for name in names:
+        print(name)
+
+
+def _table(info: DemosInfo) -> Table:
+    table = Table(show_header=False, title=info.dataset_id)
+    rows = {
+        "task": info.env_id or "unknown",
+        "episodes": f"{info.episodes} of {info.length_min} to {info.length_max} steps, {info.steps:,} in all",
+        "return": f"{info.return_mean:.1f} ± {info.return_std:.1f}",
+        "reference returns": f"random {_number(info.random_return)}, expert {_number(info.expert_return)}",
+        "reward terms": ", ".join(info.terms) or "none recorded",
+        "also recorded": ", ".join(info.infos) or "nothing",
+        "made by": info.algorithm or "unknown",
+        "size": f"{info.size_bytes / 1e6:.1f} MB",
+        "folder": str(info.path),
+    }
+    for name, value in rows.items():
+        table.add_row(name, value)
+    return table
+
+
+def _number(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.1f}"

@@ -1,0 +1,157 @@
+"""`irl evaluate`: the policy and the reward of a run in numbers, and one page to look at."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import tyro
+from rich.console import Console
+
+from irl.algorithms.probe import probe
+from irl.core import files, records
+from irl.core.config import from_json
+from irl.core.errors import UserError
+from irl.core.rng import episode_seeds
+from irl.core.types import Episode
+from irl.demos.load import Demos, load_demos
+from irl.envs.rollouts import rollouts
+from irl.experiment.configs import GAILRun
+from irl.experiment.judge import finite, judge_drift, judge_reward
+from irl.experiment.progress import progress
+from irl.policies import shelf
+from irl.policies.card import Card, normalised_score, summary
+from irl.policies.policy import load_policy
+from irl.report.html import write_report
+from irl.report.tables import evaluation_table
+from irl.rewards.artefact import load_reward
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Judge a run's policy and reward; writes evaluation.json and report.html into its folder."""
+
+    run: tyro.conf.Positional[Path]
+    """Run folder."""
+    episodes: int = 20
+    """Episodes of the deterministic policy."""
+    seed: int = 0
+    """Draws episodes and probe; apart from every training seed."""
+    datasets_root: Path | None = None
+    """Folder of Minari datasets; that of the run unless given."""
+    policies_root: Path | None = None
+    """Where the shelf is; expert_data/policies unless given."""
+
+
+def evaluate(command: Evaluate) -> None:
+    """Evaluate, write, print."""
+    folder = records.open_run(command.run)
+    if command.episodes < 1:
+        raise UserError(f"--episodes must be at least 1, not {command.episodes}")
+    result = evaluation(folder, command)
+    files.write_json(folder.path / "evaluation.json", result)
+    report = write_report(folder.path)
+    console = Console()
+    console.print(evaluation_table(result))
+    console.print(f"report: {report}", highlight=False, soft_wrap=True)
+
+
+def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
+    """The content of `evaluation.json`."""
+    config = from_json(GAILRun, folder.config, str(folder.path / "config.json"))
+    if not (snapshots := folder.snapshots()):
+        raise UserError(f"{folder.path} has no snapshot yet; go on with: irl train --resume {folder.path}")
+    torch.set_num_threads(config.threads)
+    steps, last = list(snapshots.items())[-1]
+    root = command.datasets_root or config.datasets_root
+    demos = load_demos(config.demos, episodes=config.demo_episodes, seed=config.seed, root=root)
+    episodes = _play(config.env_id, last, command)
+    expert = demos.held_out or demos.episodes
+    judged = probe(expert, episodes, config.env_id, command.seed)
+    reward = judge_reward(load_reward(last), judged, command.seed)
+    if not demos.held_out:
+        reward["notes"].append("No demonstration is held out: the expert's steps are those trained on.")
+    references = _references(config.env_id, demos, command.policies_root)
+    return {
+        "format": "irl.evaluation",
+        "version": 1,
+        "run": folder.path.resolve().name,
+        "method": config.KIND,
+        "env_id": config.env_id,
+        "env_steps": steps,
+        "policy": _policy(episodes, references),
+        "references": references,
+        "reward": reward,
+        "drift": judge_drift(snapshots, judged),
+    }
+
+
+def _play(env_id: str, snapshot: Path, command: Evaluate) -> list[Episode]:
+    seeds = episode_seeds(command.seed, "evaluation", command.episodes)
+    with progress("evaluating", command.episodes) as report:
+        done = iter(range(1, command.episodes + 1))
+        return rollouts(
+            env_id,
+            load_policy(snapshot / "policy.safetensors"),
+            seeds,
+            lambda episode: report(next(done), f"return {episode.return_:.0f}"),
+        )
+
+
+def _policy(episodes: Sequence[Episode], references: dict[str, Any]) -> dict[str, Any]:
+    measured = summary(list(episodes))
+    random, expert = references["random"], references["expert"]
+    score = normalised_score(
+        measured.return_mean,
+        random["return_mean"] if random else None,
+        expert["return_mean"] if expert else None,
+    )
+    reason = None if np.isfinite(score) else "no expert or random return is known for this task"
+    return {
+        "return_mean": measured.return_mean,
+        "return_std": measured.return_std,
+        "return_min": measured.return_min,
+        "return_max": measured.return_max,
+        "normalised_score": finite(score),
+        "normalised_score_reason": reason,
+        "episodes": measured.episodes,
+        "length_mean": measured.length_mean,
+        "length_min": measured.length_min,
+        "returns": list(measured.returns),
+        "lengths": list(measured.lengths),
+        "seeds": list(measured.episode_seeds),
+    }
+
+
+def _references(env_id: str, demos: Demos, policies_root: Path | None) -> dict[str, Any]:
+    """Returns to compare with: from the expert's card, else from the dataset, else unknown."""
+    card = _card(env_id, policies_root)
+    expert = random = None
+    if card is not None:
+        source = f"card of {card.env_id} {card.level}"
+        std = card.measured.return_std
+        expert = {"return_mean": card.measured.return_mean, "return_std": std, "source": source}
+        random = {
+            "return_mean": card.random_return_mean,
+            "return_std": card.random_return_std,
+            "source": source,
+        }
+    else:
+        source = f"dataset {demos.dataset_id}"
+        if demos.expert_return is not None:
+            expert = {"return_mean": demos.expert_return, "return_std": None, "source": source}
+        if demos.random_return is not None:
+            random = {"return_mean": demos.random_return, "return_std": None, "source": source}
+    measured = summary(list(demos.episodes))
+    shown = {"return_mean": measured.return_mean, "return_std": measured.return_std}
+    shown |= {"episodes": measured.episodes, "source": f"dataset {demos.dataset_id}"}
+    return {"expert": expert, "random": random, "demonstrations": shown}
+
+
+def _card(env_id: str, root: Path | None) -> Card | None:
+    try:
+        return shelf.find(env_id, "expert", root).card
+    except UserError:
+        return None

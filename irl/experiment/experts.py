@@ -1,0 +1,209 @@
+"""`irl experts`: train a policy on a task's own reward, measure it, put it on the shelf."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import torch
+from rich.console import Console
+from rich.table import Table
+
+from irl.core import records
+from irl.core.config import to_json
+from irl.core.errors import UserError
+from irl.core.provenance import command_line, environment, versions
+from irl.core.rng import episode_seeds
+from irl.envs.make import make
+from irl.envs.tasks import task_name
+from irl.experiment import build
+from irl.experiment.configs import ExpertRun, Watch
+from irl.experiment.play import Player
+from irl.experiment.progress import progress
+from irl.experiment.recipes import recipe
+from irl.policies import shelf
+from irl.policies.card import Card, Measurement, measure, measure_random
+from irl.policies.policy import Policy, load_policy, save_policy
+
+EPISODES = 20
+"""Episodes that a card is measured on."""
+
+
+@dataclass(frozen=True)
+class TrainExpert:
+    """Train a policy on the task's own reward and put it on the shelf.
+
+    Without other flags this repeats the recipe of the shipped expert.
+    """
+
+    env_id: str
+    """Gymnasium id of the task."""
+    algo: Literal["ppo"] = "ppo"
+    """Which learner."""
+    steps: int | None = None
+    """Environment steps; the recipe's unless given."""
+    seed: int = 0
+    """Seed of everything random."""
+    level: str = "expert"
+    """Name of the level on the shelf."""
+    out: Path | None = None
+    """Run folder; runs/<level>-<task>-<algo>-s<seed> unless given. A run that is there goes on."""
+    policies_root: Path | None = None
+    """Where the shelf is; expert_data/policies unless given."""
+    overwrite: bool = False
+    """Replace a policy that is on the shelf already; otherwise the new one stays in the run folder."""
+    watch: Watch = dataclasses.field(default_factory=lambda: Watch(eval_every=50))
+    threads: int = 1
+    """Threads of torch's operators."""
+
+
+@dataclass(frozen=True)
+class EvaluateExpert:
+    """Measure policies of the shelf again, in the episodes of their cards or in fresh ones."""
+
+    env_id: str | None = None
+    """Only this task."""
+    level: str = "expert"
+    """Only this level."""
+    episodes: int = EPISODES
+    """How many episodes."""
+    seed: int = 0
+    """Draws the episodes; 0 repeats those of the card."""
+    policies_root: Path | None = None
+    """Where the shelf is; expert_data/policies unless given."""
+
+
+@dataclass(frozen=True)
+class ListExperts:
+    """Show the shelf."""
+
+    policies_root: Path | None = None
+    """Where the shelf is; expert_data/policies unless given."""
+
+
+def train(command: TrainExpert) -> None:
+    """Train, measure, write policy and card into the run folder, and shelve them."""
+    make(command.env_id).close()
+    run = _expert_run(command)
+    torch.set_num_threads(run.threads)
+    folder = _open_or_create(run)
+    algorithm = build.forward(run)
+    player = Player(
+        algorithm,
+        folder,
+        run.watch,
+        env_id=run.env_id,
+        steps=run.steps,
+        seed=run.seed,
+        snapshot=lambda path: save_policy(algorithm.learner.policy(), path / shelf.POLICY),
+    )
+    player.resume()
+    player.play()
+    algorithm.learner.close()
+    last = list(folder.snapshots().values())[-1]
+    _shelve(run, load_policy(last / shelf.POLICY), command)
+
+
+def _expert_run(command: TrainExpert) -> ExpertRun:
+    chosen = recipe(command.env_id, command.algo)
+    task = task_name(command.env_id)
+    return ExpertRun(
+        env_id=command.env_id,
+        level=command.level,
+        steps=command.steps or chosen.steps,
+        seed=command.seed,
+        out=command.out or Path("runs") / f"{command.level}-{task}-{command.algo}-s{command.seed}",
+        learner=chosen.learner,
+        watch=command.watch,
+        device="cpu",
+        threads=command.threads,
+    )
+
+
+def _open_or_create(run: ExpertRun) -> records.RunFolder:
+    config = to_json(run)
+    if (run.out / "config.json").is_file():
+        folder = records.open_run(run.out)
+        if different := [
+            k for k in config if config[k] != folder.config.get(k) and k not in ("watch", "out")
+        ]:
+            raise UserError(
+                f"{run.out} holds a run with other settings ({', '.join(different)}); choose another --out"
+            )
+        return folder
+    return records.create(run.out, config, environment(command_line(), run.device))
+
+
+def _shelve(run: ExpertRun, policy: Policy, command: TrainExpert) -> None:
+    console = Console()
+    measured = _measured(run.env_id, policy, EPISODES, 0)
+    random = measure_random(run.env_id)
+    card = Card(
+        env_id=run.env_id,
+        level=run.level,
+        algorithm=command.algo,
+        steps=run.steps,
+        seed=run.seed,
+        measured=measured,
+        random_return_mean=random.return_mean,
+        random_return_std=random.return_std,
+        settings=to_json(run.learner),
+        versions=versions(),
+        command=command_line(),
+    )
+    shelf.write(run.out / "policy", policy, card)
+    console.print(_table([(card, measured)]))
+    place = shelf.writable_root(command.policies_root) / task_name(run.env_id) / run.level
+    if (place / shelf.CARD).is_file() and not command.overwrite:
+        console.print(f"{place} holds a policy already; kept. The new one is in {run.out / 'policy'}")
+        return
+    shelf.write(place, policy, card)
+    console.print(f"shelved as {place}")
+
+
+def _measured(env_id: str, policy: Policy, n: int, seed: int) -> Measurement:
+    with progress(f"measuring {env_id}", n) as report:
+        done = iter(range(1, n + 1))
+        seeds = episode_seeds(seed, "card", n)
+        return measure(env_id, policy, seeds, lambda e: report(next(done), f"return {e.return_:.0f}"))
+
+
+def evaluate(command: EvaluateExpert) -> None:
+    """Measure again what the shelf holds and print it beside the cards' means."""
+    chosen = [c for c in shelf.cards(command.policies_root) if command.env_id in (None, c.env_id)]
+    if command.env_id is not None and not chosen:
+        shelf.find(command.env_id, command.level, command.policies_root)
+    rows = []
+    for card in chosen:
+        if card.level == command.level:
+            policy = shelf.find(card.env_id, card.level, command.policies_root).policy
+            rows.append((card, _measured(card.env_id, policy, command.episodes, command.seed)))
+    Console().print(_table(rows))
+
+
+def list_experts(command: ListExperts) -> None:
+    """Print the cards of the shelf."""
+    cards = shelf.cards(command.policies_root)
+    if not cards:
+        roots = ", ".join(str(root) for root in shelf.roots(command.policies_root))
+        raise UserError(f"no policies in {roots}; train one with: irl experts train --env-id Hopper-v5")
+    Console().print(_table([(card, card.measured) for card in cards]))
+
+
+def _table(rows: list[tuple[Card, Measurement]]) -> Table:
+    columns = ("task", "level", "algorithm", "steps", "return", "min", "length", "min", "random", "episodes")
+    table = Table(*columns, title="deterministic policies, undiscounted return (mean ± std over episodes)")
+    for card, m in rows:
+        table.add_row(
+            card.env_id,
+            card.level,
+            card.algorithm,
+            f"{card.steps:,}",
+            f"{m.return_mean:.1f} ± {m.return_std:.1f}",
+            f"{m.return_min:.1f}",
+            f"{m.length_mean:.0f}",
+            str(m.length_min),
+            f"{card.random_return_mean:.1f}",
+            str(m.episodes),
+        )
+    return table

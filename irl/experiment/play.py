@@ -1,0 +1,167 @@
+"""Plays an algorithm to its end, and lets the run folder listen.
+
+Nothing here changes a weight: evaluation, snapshots, curves and the progress bar have their own
+environments and random streams.
+"""
+
+import signal
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from irl.algorithms.loop import Learner, Round
+from irl.core.records import RunFolder, snapshot_steps
+from irl.core.rng import episode_seeds
+from irl.core.types import Metrics
+from irl.envs.rollouts import rollouts
+from irl.experiment.configs import Watch
+from irl.experiment.curves import curves
+from irl.experiment.progress import progress, training_words
+
+RECENT = 20
+"""Training episodes that `return_mean` is the mean of."""
+
+
+class Algorithm(Protocol):
+    """What can be played."""
+
+    learner: Learner
+
+    @property
+    def index(self) -> int: ...
+    def rounds(self, steps: int) -> Iterator[Round]: ...
+    def state_dict(self) -> dict[str, Any]: ...
+    def load_state_dict(self, state: dict[str, Any]) -> None: ...
+
+
+class Interrupted(Exception):
+    """Ctrl-C or SIGTERM: the round was finished and a checkpoint written."""
+
+
+class Player:
+    """One algorithm, one folder, and what was seen so far."""
+
+    def __init__(
+        self,
+        algorithm: Algorithm,
+        folder: RunFolder,
+        watch: Watch,
+        *,
+        env_id: str,
+        steps: int,
+        seed: int,
+        snapshot: Callable[[Path], None],
+    ) -> None:
+        """`snapshot` writes policy and reward into the folder it is given."""
+        self.algorithm, self.folder, self.watch = algorithm, folder, watch
+        self.env_id, self.steps, self.snapshot = env_id, steps, snapshot
+        self._eval_seeds = episode_seeds(seed, "evaluation while training", watch.eval_episodes)
+        self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
+        self._wall_s = 0.0
+
+    def resume(self) -> None:
+        """Go on from the folder's last checkpoint; from the start when there is none."""
+        if (content := self.folder.load_checkpoint()) is not None:
+            self.algorithm.load_state_dict(content["algorithm"])
+            self._recent.extend(content["recent"])
+            self._wall_s = content["wall_s"]
+        self.folder.forget_rounds_after(self.algorithm.index)
+
+    def play(self) -> None:
+        """Play to the end.
+
+        Raises:
+            Interrupted: the user asked to stop; a checkpoint is there to go on from.
+        """
+        learner = self.algorithm.learner
+        began, start = time.monotonic() - self._wall_s, learner.env_steps
+        saved = time.monotonic()
+        due = [step for step in snapshot_steps(self.steps) if step > start or step == start == 0]
+        due = self._snapshots(due)
+        with (
+            asked_to_stop() as asked,
+            curves(self.folder.path, self.watch.tensorboard) as draw,
+            progress(self.folder.path.name, self.steps, start, self.watch.progress) as report,
+        ):
+            for round_ in self.algorithm.rounds(self.steps):
+                row = self._row(round_, time.monotonic() - began)
+                self.folder.append(row)
+                draw(row)
+                due = self._snapshots(due)
+                rate = (learner.env_steps - start) / (time.monotonic() - began - self._wall_s)
+                report(min(learner.env_steps, self.steps), training_words(row, rate))
+                late = time.monotonic() - saved > self.watch.checkpoint_every_s
+                if late or asked() or learner.env_steps >= self.steps:
+                    self._checkpoint(time.monotonic() - began)
+                    saved = time.monotonic()
+                if asked() and learner.env_steps < self.steps:
+                    raise Interrupted
+
+    def _row(self, round_: Round, wall_s: float) -> dict[str, float | None]:
+        self._recent.extend(self.algorithm.learner.take_finished())
+        returns = [value for value, _ in self._recent]
+        lengths = [length for _, length in self._recent]
+        row: dict[str, float | None] = {
+            "round": round_.index,
+            "env_steps": round_.env_steps,
+            "wall_s": round(wall_s, 3),
+            "return_mean": float(np.mean(returns)) if returns else None,
+            "length_mean": float(np.mean(lengths)) if lengths else None,
+        }
+        return {**row, **round_.metrics, **self._evaluation(round_)}
+
+    def _evaluation(self, round_: Round) -> Metrics:
+        last, every = round_.env_steps >= self.steps, self.watch.eval_every
+        if self.watch.eval_episodes == 0 or not (last or (every and round_.index % every == 0)):
+            return {}
+        episodes = rollouts(self.env_id, self.algorithm.learner.policy(), self._eval_seeds)
+        return {
+            "eval_return_mean": float(np.mean([episode.return_ for episode in episodes])),
+            "eval_length_mean": float(np.mean([len(episode) for episode in episodes])),
+        }
+
+    def _snapshots(self, due: list[int]) -> list[int]:
+        """Take the snapshot that is due, if one is; return those that are not yet."""
+        steps = self.algorithm.learner.env_steps
+        if any(step <= steps for step in due):
+            with self.folder.snapshot(steps) as folder:
+                self.snapshot(folder)
+        return [step for step in due if step > steps]
+
+    def _checkpoint(self, wall_s: float) -> None:
+        content = {
+            "algorithm": self.algorithm.state_dict(),
+            "recent": [list(item) for item in self._recent],
+            "wall_s": wall_s,
+        }
+        self.folder.save_checkpoint(self.algorithm.learner.env_steps, content)
+
+
+@contextmanager
+def asked_to_stop() -> Iterator[Callable[[], bool]]:
+    """Whether SIGINT or SIGTERM came; the second one of a kind ends the process as usual."""
+    asked = False
+
+    def note(number: int, frame: object) -> None:
+        nonlocal asked
+        asked = True
+        signal.signal(number, before[signal.Signals(number)])
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for number in before:
+            signal.signal(number, note)
+    except ValueError:
+        # not the main thread: signals are somebody else's
+        yield lambda: False
+        return
+    try:
+        yield lambda: asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,29 @@
+"""How each expert was made: settings by task and algorithm, as data."""
+
+from dataclasses import dataclass
+
+from irl.learners.ppo import PPOConfig
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """An algorithm's settings and how long it runs."""
+
+    steps: int
+    learner: PPOConfig
+
+
+_PPO = PPOConfig(lr_schedule="linear")
+
+DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_000_000, _PPO)}
+"""For a task without a row of its own, by algorithm."""
+
+RECIPES: dict[tuple[str, str], Recipe] = {
+    ("Hopper-v5", "ppo"): Recipe(3_000_000, _PPO),
+}
+"""By task and algorithm."""
+
+
+def recipe(env_id: str, algo: str) -> Recipe:
+    """The row of this task, or the algorithm's default."""
+    return RECIPES.get((env_id, algo), DEFAULTS[algo])

@@ -1,0 +1,128 @@
+"""`irl train`: learn a policy and a reward from demonstrations."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from rich.console import Console
+
+from irl.algorithms.adversarial import Adversarial
+from irl.core import files, records
+from irl.core.config import from_json, to_json
+from irl.core.errors import UserError
+from irl.core.provenance import command_line, environment
+from irl.core.types import from_episodes
+from irl.demos.load import Demos, check_task, load_demos
+from irl.discriminators.gail import GAIL
+from irl.envs.make import make
+from irl.experiment import build
+from irl.experiment.configs import GAILRun
+from irl.experiment.play import Interrupted, Player
+from irl.policies.policy import save_policy
+from irl.rewards.artefact import RewardSpec, save_reward
+
+
+@dataclass(frozen=True)
+class Resume:
+    """Go on with a run, or repeat one from its config.json."""
+
+    resume: Path | None = None
+    """Run folder to go on with, from its last checkpoint."""
+    config: Path | None = None
+    """A config.json to run again."""
+    out: Path | None = None
+    """Where the repeated run goes; needed with --config."""
+
+
+def train_gail(config: GAILRun) -> None:
+    """Train GAIL into a new run folder."""
+    config = config.resolved()
+    env = make(config.env_id)
+    try:
+        demos = load_demos(
+            config.demos, episodes=config.demo_episodes, seed=config.seed, root=config.datasets_root
+        )
+        check_task(demos, env)
+    finally:
+        env.close()
+    torch.set_num_threads(config.threads)
+    assert config.out is not None
+    folder = records.create(config.out, to_json(config), environment(command_line(), config.device))
+    files.write_json(folder.path / "demonstrations.json", _drawn(demos))
+    play(config, demos, folder)
+
+
+def go_on(command: Resume) -> None:
+    """Resume a run where its last checkpoint is, or start one again from its settings."""
+    if (command.resume is None) == (command.config is None):
+        raise UserError(
+            "irl train takes a method (irl train gail ...), --resume RUN, or --config FILE --out FOLDER"
+        )
+    if command.config is not None:
+        if command.out is None:
+            raise UserError("--config repeats a run in a new folder: name it with --out FOLDER")
+        config = from_json(GAILRun, files.read_json(command.config), str(command.config))
+        return train_gail(replace(config, out=command.out))
+    assert command.resume is not None
+    folder = records.open_run(command.resume)
+    config = from_json(GAILRun, folder.config, str(folder.path / "config.json"))
+    demos = load_demos(
+        config.demos, episodes=config.demo_episodes, seed=config.seed, root=config.datasets_root
+    )
+    torch.set_num_threads(config.threads)
+    return play(config, demos, folder)
+
+
+def play(config: GAILRun, demos: Demos, folder: records.RunFolder) -> None:
+    """Train into `folder`, from its last checkpoint where it has one."""
+    algorithm = build.adversarial(config, from_episodes(demos.episodes))
+    player = Player(
+        algorithm,
+        folder,
+        config.watch,
+        env_id=config.env_id,
+        steps=config.steps,
+        seed=config.seed,
+        snapshot=lambda path: _snapshot(config, demos, algorithm, path),
+    )
+    player.resume()
+    console = Console(stderr=True)
+    try:
+        player.play()
+    except Interrupted:
+        console.print(
+            f"stopped; go on with: irl train --resume {folder.path}", highlight=False, soft_wrap=True
+        )
+        raise
+    finally:
+        algorithm.learner.close()
+    console.print(f"trained; judge it with: irl evaluate {folder.path}", highlight=False, soft_wrap=True)
+
+
+def _snapshot(config: GAILRun, demos: Demos, algorithm: Adversarial, path: Path) -> None:
+    """The policy, and the reward that its next round would be rewarded by."""
+    learner, discriminator = algorithm.learner, algorithm.discriminator
+    assert isinstance(discriminator, GAIL)
+    save_policy(learner.policy(), path / "policy.safetensors")
+    spec = RewardSpec(
+        env_id=config.env_id,
+        method=config.KIND,
+        reward_map=discriminator.reward_map,
+        inputs="obs, action",
+        net=discriminator.net.spec,
+        gamma=config.learner.gamma,
+        reward_scale=learner.reward_scale,
+        env_steps=learner.env_steps,
+        provenance=_drawn(demos) | {"seed": config.seed},
+    )
+    save_reward(path / "reward", spec, discriminator.net)
+
+
+def _drawn(demos: Demos) -> dict[str, Any]:
+    return {
+        "dataset": demos.dataset_id,
+        "episodes": list(demos.indices),
+        "held_out": list(demos.held_out_indices),
+        "returns": [episode.return_ for episode in demos],
+    }

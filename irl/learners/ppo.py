@@ -1,0 +1,266 @@
+"""Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347) on a reward given afterwards.
+
+    A_t = sum_l (gamma lambda)^l delta_{t+l},  delta_t = r'_t + gamma V(s_{t+1}) - V(s_t)
+    r'_t = r_t / std(G) + [truncated at t] gamma V(s_{t+1})
+    L    = E[min(rho A, clip(rho, 1-eps, 1+eps) A)] - c_v (V - R)^2 + c_e H
+
+Stable-Baselines3 collects and does the gradient steps. Between the two its rollout buffer is given the
+reward of a `RewardFn`, and the value of the observation that a time limit cut off is added again on that
+reward (SB3 adds it to the environment's while it collects), and the advantages are computed anew.
+
+Differs from the paper: observations are normalised inside the policy; rewards are scaled by the running
+standard deviation of their discounted return.
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from stable_baselines3 import PPO
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from torch import Tensor, nn
+
+from irl.core.nets import ACTIVATIONS, Normaliser
+from irl.core.types import Metrics, RewardFn, Transitions
+from irl.learners.vec import RecordingVecEnv
+from irl.policies.policy import Policy, PolicySpec
+from irl.rewards.normalise import ReturnScale
+
+
+@dataclass(frozen=True)
+class PPOConfig:
+    """How the policy is improved."""
+
+    KIND: ClassVar[str] = "ppo"
+    n_envs: int = 8
+    """Environments stepped side by side."""
+    steps_per_round: int = 2048
+    """Environment steps of one rollout, over all environments."""
+    batch_size: int = 256
+    """Transitions of one gradient step."""
+    n_epochs: int = 10
+    """Passes over each rollout."""
+    lr: float = 3e-4
+    """Adam step size."""
+    lr_schedule: Literal["constant", "linear"] = "constant"
+    """`constant`, or `linear` from `lr` to 0 over the run."""
+    gamma: float = 0.99
+    """Discount per environment step."""
+    gae_lambda: float = 0.95
+    """Weight of longer advantage estimates."""
+    clip_range: float = 0.2
+    """How far a probability ratio may move."""
+    ent_coef: float = 0.0
+    """Weight of the entropy bonus."""
+    hidden: tuple[int, ...] = (64, 64)
+    """Width of each hidden layer of policy and value, tanh between."""
+    log_std_init: float = -0.5
+    """Logarithm of the first standard deviation of the actions."""
+
+    def __post_init__(self) -> None:
+        if self.steps_per_round % self.n_envs or self.steps_per_round % self.batch_size:
+            raise ValueError(
+                f"steps_per_round ({self.steps_per_round}) must be a multiple of n_envs ({self.n_envs}) "
+                f"and of batch_size ({self.batch_size})"
+            )
+        if not 0.0 <= self.gamma < 1.0:
+            raise ValueError(f"gamma must be in [0, 1), not {self.gamma}")
+
+
+class NormalisedFeatures(BaseFeaturesExtractor):
+    """The observation normaliser as SB3's feature extractor, so that it travels with the policy."""
+
+    def __init__(self, observation_space: Any, normaliser: Normaliser | None = None) -> None:
+        super().__init__(observation_space, features_dim=observation_space.shape[0])
+        self.normaliser = normaliser or Normaliser(observation_space.shape[0])
+
+    def forward(self, obs: Float[Tensor, "B O"]) -> Float[Tensor, "B O"]:
+        """Normalised observations."""
+        return self.normaliser(obs)
+
+
+class PPOLearner:
+    """Collects rollouts, is told their reward, and improves the policy.
+
+    SB3 draws actions and minibatches from the global numpy and torch generators, seeded here; whoever
+    runs beside it must leave them alone.
+    """
+
+    def __init__(
+        self,
+        env_id: str,
+        env_seeds: list[int],
+        config: PPOConfig,
+        *,
+        seed: int,
+        total_steps: int,
+        normaliser: Normaliser | None = None,
+        env_kwargs: dict[str, Any] | None = None,
+        device: str = "cpu",
+    ) -> None:
+        """`normaliser` is kept as it is; without one, a running normaliser follows the rollouts."""
+        self.config, self.env_id, self.total_steps = config, env_id, total_steps
+        self.venv = RecordingVecEnv(env_id, env_seeds, env_kwargs)
+        self._running = normaliser is None
+        self._scale = ReturnScale(config.n_envs, config.gamma)
+        self._batch: Transitions | None = None
+        self.model = PPO(
+            "MlpPolicy",
+            self.venv,
+            learning_rate=_schedule(config),
+            n_steps=config.steps_per_round // config.n_envs,
+            batch_size=config.batch_size,
+            n_epochs=config.n_epochs,
+            gamma=config.gamma,
+            gae_lambda=config.gae_lambda,
+            clip_range=config.clip_range,
+            ent_coef=config.ent_coef,
+            policy_kwargs={
+                "net_arch": list(config.hidden),
+                "activation_fn": nn.Tanh,
+                "log_std_init": config.log_std_init,
+                "features_extractor_class": NormalisedFeatures,
+                "features_extractor_kwargs": {"normaliser": normaliser},
+            },
+            seed=seed,
+            device=device,
+        )
+        self.model.set_logger(Logger(folder=None, output_formats=[]))
+        _, self._callback = self.model._setup_learn(total_steps, callback=None)
+
+    @property
+    def env_steps(self) -> int:
+        """Environment steps taken so far, over all environments."""
+        return self.model.num_timesteps
+
+    @property
+    def reward_scale(self) -> float:
+        """What the reward is divided by before PPO sees it."""
+        return self._scale.std
+
+    def take_finished(self) -> list[tuple[float, int]]:
+        """Return (the environment's own) and length of each episode that ended since the last call."""
+        return self.venv.take_finished()
+
+    @property
+    def _normaliser(self) -> Normaliser:
+        extractor = self.model.policy.features_extractor
+        assert isinstance(extractor, NormalisedFeatures)
+        return extractor.normaliser
+
+    def collect(self) -> Transitions:
+        """One rollout of the current policy, time-major; actions as the environment saw them."""
+        model = self.model
+        model.collect_rollouts(self.venv, self._callback, model.rollout_buffer, model.n_steps)
+        self._batch = self.venv.take()
+        return self._batch
+
+    def improve(self, reward: RewardFn) -> Metrics:
+        """Reward the last rollout in one batch and do PPO's gradient steps on it.
+
+        Raises:
+            RuntimeError: nothing was collected since the last call.
+        """
+        if self._batch is None:
+            raise RuntimeError("collect a rollout before improving on it")
+        batch, self._batch = self._batch, None
+        raw = self._give_rewards(batch, reward)
+        # SB3's train() reads the remaining progress for its schedules
+        self.model._update_current_progress_remaining(self.env_steps, self.total_steps)
+        self.model.train()
+        if self._running:
+            # after the gradient steps: within a round, old and new log pi see one normaliser
+            self._normaliser.update(batch.obs)
+        return self._metrics() | {
+            "reward/mean": float(raw.mean()),
+            "reward/std": float(raw.std()),
+            "reward/scale": self._scale.std,
+        }
+
+    @torch.no_grad()
+    def _give_rewards(self, batch: Transitions, reward: RewardFn) -> np.ndarray:
+        model, buffer = self.model, self.model.rollout_buffer
+        shape = buffer.rewards.shape
+        raw = reward(batch).double().cpu().numpy().reshape(shape)
+        ended = (batch.terminated | batch.truncated).cpu().numpy().reshape(shape)
+        self._scale.update(raw, ended)
+        buffer.rewards[:] = raw / self._scale.std
+        cut_off = batch.truncated & ~batch.terminated
+        if bool(cut_off.any()):
+            values = model.policy.predict_values(batch.next_obs[cut_off].to(model.device))
+            where = cut_off.cpu().numpy().reshape(shape)
+            buffer.rewards[where] += model.gamma * values.flatten().cpu().numpy()
+        assert isinstance(model._last_obs, np.ndarray)
+        assert model._last_episode_starts is not None
+        last_values = model.policy.predict_values(torch.as_tensor(model._last_obs, device=model.device))
+        buffer.compute_returns_and_advantage(last_values, model._last_episode_starts)
+        return raw
+
+    def _metrics(self) -> Metrics:
+        logged = self.model.logger.name_to_value
+        names = ("approx_kl", "clip_fraction", "value_loss", "explained_variance", "std")
+        metrics = {f"ppo/{name}": float(logged[f"train/{name}"]) for name in names}
+        logged.clear()
+        return metrics
+
+    def policy(self) -> Policy:
+        """The current policy, exported: a copy that later updates leave alone."""
+        net, spaces = self.model.policy, self.venv
+        layers = [m for m in net.mlp_extractor.policy_net if isinstance(m, nn.Linear)]
+        assert isinstance(net.action_net, nn.Linear)
+        weights = {"obs_mean": self._normaliser.mean, "obs_std": self._normaliser.std}
+        weights |= {"log_std": net.log_std}
+        for i, layer in enumerate([*layers, net.action_net]):
+            weights |= {f"layers.{i}.weight": layer.weight, f"layers.{i}.bias": layer.bias}
+        arrays = {name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()}
+        arrays |= {"action_low": spaces.action_space.low, "action_high": spaces.action_space.high}  # pyright: ignore[reportAttributeAccessIssue]
+        activation = next(name for name, kind in ACTIVATIONS.items() if kind is net.activation_fn)
+        sizes = (self._normaliser.mean.shape[0], net.action_net.out_features)
+        spec = PolicySpec(self.env_id, *sizes, self.config.hidden, activation, "gaussian")
+        return Policy(spec, arrays)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything needed to go on, between two rounds."""
+        model = self.model
+        return {
+            "policy": model.policy.state_dict(),
+            "optimizer": model.policy.optimizer.state_dict(),
+            "steps": model.num_timesteps,
+            "updates": model._n_updates,
+            "last_obs": model._last_obs,
+            "last_starts": model._last_episode_starts,
+            "scale": self._scale.state_dict(),
+            "environments": self.venv.state_dict(),
+            # SB3 samples from these
+            "global_random": (torch.get_rng_state(), np.random.get_state(), random.getstate()),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go on where another learner of the same settings was."""
+        model = self.model
+        model.policy.load_state_dict(state["policy"])
+        model.policy.optimizer.load_state_dict(state["optimizer"])
+        model.num_timesteps, model._n_updates = state["steps"], state["updates"]
+        model._last_obs, model._last_episode_starts = state["last_obs"], state["last_starts"]
+        self._scale.load_state_dict(state["scale"])
+        self.venv.load_state_dict(state["environments"])
+        self.venv.resume_from(state["last_obs"])
+        torch_state, numpy_state, python_state = state["global_random"]
+        torch.set_rng_state(torch_state)
+        np.random.set_state(numpy_state)
+        random.setstate(python_state)
+
+    def close(self) -> None:
+        """Close the environments."""
+        self.venv.close()
+
+
+def _schedule(config: PPOConfig) -> float | Callable[[float], float]:
+    if config.lr_schedule == "constant":
+        return config.lr
+    return lambda remaining: config.lr * remaining

@@ -1,0 +1,146 @@
+"""A trained policy that needs neither its learner nor torch to act.
+
+    x = clip((obs - mean) / std, -10, 10);  m = mlp(x)
+    gaussian:           action = clip(m, low, high)
+    squashed_gaussian:  action = low + (tanh(m) + 1) / 2 * (high - low)
+
+Saved as one safetensors file whose header holds the specification as JSON. About 15 microseconds a
+call for two hidden layers of 64.
+"""
+
+import itertools
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from irl.core import files
+from irl.core.errors import UserError
+from irl.core.nets import CLIP
+
+FORMAT, VERSION = "irl.policy", 1
+_ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
+_DISTRIBUTIONS = ("gaussian", "squashed_gaussian")
+
+
+@dataclass(frozen=True)
+class PolicySpec:
+    """What the weights of a policy mean."""
+
+    env_id: str
+    obs_dim: int
+    action_dim: int
+    hidden: tuple[int, ...]
+    activation: str
+    distribution: str
+    """`gaussian` (clipped to the bounds) or `squashed_gaussian` (tanh, scaled to the bounds)."""
+
+
+class Policy:
+    """An exported policy: call it with an observation to get the mean action in environment units.
+
+    Weights are `layers.<i>.weight (out, in)`, `layers.<i>.bias`, `log_std (A,)` or, for a
+    state-dependent one, `log_std.weight (A, H)` and `log_std.bias`, `obs_mean`, `obs_std (O,)`,
+    `action_low` and `action_high (A,)`.
+    """
+
+    def __init__(self, spec: PolicySpec, weights: dict[str, np.ndarray]) -> None:
+        self.spec = spec
+        self.weights = {name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
+        self._check_shapes()
+        self._layers = [
+            (self.weights[f"layers.{i}.weight"], self.weights[f"layers.{i}.bias"])
+            for i in range(len(spec.hidden) + 1)
+        ]
+        self._activation = _ACTIVATIONS[spec.activation]
+        self._low, self._high = self.weights["action_low"], self.weights["action_high"]
+
+    def __repr__(self) -> str:
+        s = self.spec
+        return f"Policy({s.env_id}, {s.obs_dim} -> {s.hidden} -> {s.action_dim}, {s.distribution})"
+
+    def __call__(self, obs: Float[np.ndarray, "O"]) -> Float[np.ndarray, "A"]:
+        """The deterministic action."""
+        return self._bounded(self._mean(self._features(obs)))
+
+    def sample(self, obs: Float[np.ndarray, "O"], rng: np.random.Generator) -> Float[np.ndarray, "A"]:
+        """An action drawn from the policy's own distribution."""
+        features = self._features(obs)
+        mean = self._mean(features)
+        std = np.exp(self._log_std(features))
+        noise = rng.standard_normal(len(mean), dtype=np.float32)
+        return self._bounded(mean + std * noise)
+
+    def _features(self, obs: np.ndarray) -> np.ndarray:
+        x = (obs - self.weights["obs_mean"]) / self.weights["obs_std"]
+        x = np.minimum(np.maximum(x, -CLIP), CLIP).astype(np.float32)
+        for weight, bias in self._layers[:-1]:
+            x = self._activation(weight @ x + bias)
+        return x
+
+    def _mean(self, features: np.ndarray) -> np.ndarray:
+        weight, bias = self._layers[-1]
+        return weight @ features + bias
+
+    def _log_std(self, features: np.ndarray) -> np.ndarray:
+        if "log_std" in self.weights:
+            return self.weights["log_std"]
+        head = self.weights["log_std.weight"] @ features + self.weights["log_std.bias"]
+        # the bounds SB3's SAC keeps its own log standard deviation within
+        return np.clip(head, -20.0, 2.0)
+
+    def _bounded(self, action: np.ndarray) -> np.ndarray:
+        if self.spec.distribution == "squashed_gaussian":
+            return self._low + (np.tanh(action) + 1.0) / 2.0 * (self._high - self._low)
+        return np.minimum(np.maximum(action, self._low), self._high)
+
+    def _check_shapes(self) -> None:
+        spec = self.spec
+        if spec.activation not in _ACTIVATIONS or spec.distribution not in _DISTRIBUTIONS:
+            raise ValueError(f"unknown activation or distribution in {spec}")
+        sizes = (spec.obs_dim, *spec.hidden, spec.action_dim)
+        expected: dict[str, tuple[int, ...]] = {"obs_mean": sizes[:1], "obs_std": sizes[:1]}
+        expected |= {"action_low": sizes[-1:], "action_high": sizes[-1:]}
+        for i, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
+            expected |= {f"layers.{i}.weight": (outputs, inputs), f"layers.{i}.bias": (outputs,)}
+        for name, shape in expected.items():
+            found = self.weights[name].shape if name in self.weights else None
+            if found != shape:
+                raise ValueError(f"{name}: expected shape {shape}, found {found}")
+        log_std = {"log_std"} if "log_std" in self.weights else {"log_std.weight", "log_std.bias"}
+        if set(self.weights) != set(expected) | log_std:
+            raise ValueError(f"unexpected weights: {sorted(set(self.weights) ^ (set(expected) | log_std))}")
+
+
+def save_policy(policy: Policy, path: Path) -> None:
+    """Write the policy; `load_policy(path)` acts the same to the bit."""
+    header = {"format": FORMAT, "version": str(VERSION), "spec": json.dumps(asdict(policy.spec))}
+    files.write_bytes(path, save(policy.weights, metadata=header))
+
+
+def load_policy(path: Path | str) -> Policy:
+    """The policy in a `.safetensors` file.
+
+    Raises:
+        UserError: the file is missing, is no policy of this format, or its weights do not fit its
+            specification.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise UserError(f"no policy file {path}")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            header = file.metadata() or {}
+            weights = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        if (header.get("format"), header.get("version")) != (FORMAT, str(VERSION)):
+            raise ValueError(
+                f"expected format {FORMAT} {VERSION}, found {header.get('format')} {header.get('version')}"
+            )
+        spec = json.loads(header["spec"])
+        return Policy(PolicySpec(**spec | {"hidden": tuple(spec["hidden"])}), weights)
+    except (SafetensorError, KeyError, TypeError, ValueError) as error:
+        raise UserError(f"{path} is not a policy this version reads: {error}") from error

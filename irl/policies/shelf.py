@@ -1,0 +1,90 @@
+"""The shelf: policies/<task>/<level>/ with policy.safetensors and card.json.
+
+Looked for, in this order: the folder given, IRL_POLICIES_PATH, the source checkout's
+expert_data/policies, the policies inside the installed package, ./expert_data/policies.
+"""
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from irl.core import files
+from irl.core.errors import UserError
+from irl.envs.tasks import task_name
+from irl.policies.card import Card, read_card, write_card
+from irl.policies.policy import Policy, load_policy, save_policy
+
+POLICY, CARD = "policy.safetensors", "card.json"
+_PACKAGE = Path(__file__).parent.parent
+
+
+@dataclass(frozen=True)
+class Shelved:
+    """A policy of the shelf with its card."""
+
+    policy: Policy
+    card: Card
+    path: Path
+
+
+def roots(root: Path | None = None) -> list[Path]:
+    """Every folder that may hold policies, the first to be written to."""
+    found = [root] if root else []
+    if given := os.environ.get("IRL_POLICIES_PATH"):
+        found.append(Path(given))
+    if (_PACKAGE.parent / "pyproject.toml").is_file():
+        found.append(_PACKAGE.parent / "expert_data" / "policies")
+    return [*found, _PACKAGE / "expert_data" / "policies", Path("expert_data/policies")]
+
+
+def writable_root(root: Path | None = None) -> Path:
+    """Where a new policy goes: the first root that is not inside the installed package."""
+    inside = _PACKAGE / "expert_data" / "policies"
+    return next(folder for folder in roots(root) if folder != inside)
+
+
+def find(env_id: str, level: str = "expert", root: Path | None = None) -> Shelved:
+    """The policy of a task.
+
+    Raises:
+        UserError: there is none, or its weights are not the ones its card was made for.
+    """
+    for folder in roots(root):
+        path = folder / task_name(env_id) / level
+        if (path / CARD).is_file():
+            card = read_card(path / CARD)
+            if card.env_id == env_id:
+                return _load(path, card)
+    there = ", ".join(f"{s.env_id} {s.level}" for s in cards(root)) or "none"
+    raise UserError(
+        f"no {level} policy for {env_id} on the shelf (there: {there}); "
+        f"train one with: irl experts train --env-id {env_id}"
+    )
+
+
+def cards(root: Path | None = None) -> list[Card]:
+    """The card of every shelved policy; a task and level found twice counts once, as `find` would."""
+    found: dict[tuple[str, str], Card] = {}
+    for folder in roots(root):
+        for path in sorted(folder.glob(f"*/*/{CARD}")):
+            card = read_card(path)
+            found.setdefault((card.env_id, card.level), card)
+    return list(found.values())
+
+
+def write(folder: Path, policy: Policy, card: Card) -> None:
+    """Write a policy and its card as one folder, replacing what was there."""
+    with files.new_folder(folder) as aside:
+        save_policy(policy, aside / POLICY)
+        write_card(replace(card, weights_sha256=files.sha256(aside / POLICY)), aside / CARD)
+
+
+def _load(path: Path, card: Card) -> Shelved:
+    digest = files.sha256(path / POLICY)
+    if digest != card.weights_sha256:
+        raise UserError(
+            f"{path / POLICY} is not the file its card describes (sha256 {digest[:12]}, the card says "
+            f"{card.weights_sha256[:12]}); restore it or train again with: "
+            f"irl experts train --env-id {card.env_id} --overwrite"
+        )
+    return Shelved(load_policy(path / POLICY), card, path)

@@ -1,0 +1,87 @@
+"""What the page says about the run itself: how it was made, and every setting of it."""
+
+from collections.abc import Mapping
+from html import escape
+from typing import Any
+
+from irl.report.folder import RunFiles, number
+from irl.report.readings import headline
+
+CHIEF_PACKAGES = ("irl", "torch", "stable-baselines3", "gymnasium", "mujoco", "numpy")
+
+
+def header(run: RunFiles) -> str:
+    """Name, method, task and steps, the two sentences to remember, and how to repeat the run."""
+    evaluation, config, environment = run.evaluation, run.config, run.environment
+    kind = evaluation.get("method") or config.get("kind") or "unknown method"
+    task = evaluation.get("env_id") or config.get("env_id") or "unknown task"
+    steps = number(evaluation, "env_steps")
+    if steps is None:
+        steps = max((number(row, "env_steps") or 0.0 for row in run.metrics), default=0.0)
+    facts = {
+        "Seed": config.get("seed"),
+        "Command": environment.get("command"),
+        "Code": _commit(environment),
+        "Machine": _joined(environment.get("machine"), _device(environment)),
+        "Versions": _versions(environment),
+    }
+    return (
+        f"<header><h1>{escape(run.name)}</h1>"
+        f'<p class="kind">{escape(str(kind))} on {escape(str(task))}, {steps:,.0f} environment steps</p>'
+        f'<p class="lead">{escape(headline(evaluation))}</p>{_facts(facts)}</header>'
+    )
+
+
+def _commit(environment: Mapping[str, Any]) -> str | None:
+    commit = environment.get("git_commit")
+    if not commit:
+        return None
+    return f"commit {str(commit)[:10]}" + (
+        " with uncommitted changes" if environment.get("git_dirty") else ""
+    )
+
+
+def _device(environment: Mapping[str, Any]) -> str | None:
+    threads = environment.get("threads")
+    return _joined(environment.get("device"), f"{threads} threads" if threads is not None else None)
+
+
+def _versions(environment: Mapping[str, Any]) -> str | None:
+    packages = environment.get("packages")
+    known = packages if isinstance(packages, Mapping) else {}
+    chief = [f"{name} {known[name]}" for name in CHIEF_PACKAGES if name in known]
+    python = environment.get("python")
+    return _joined(f"Python {python}" if python else None, *chief)
+
+
+def _joined(*parts: object) -> str | None:
+    return ", ".join(str(part) for part in parts if part) or None
+
+
+def _facts(facts: Mapping[str, object]) -> str:
+    rows = (
+        f"<dt>{escape(name)}</dt><dd>{escape(str(value))}</dd>"
+        for name, value in facts.items()
+        if value is not None
+    )
+    return f'<dl class="facts">{"".join(rows)}</dl>'
+
+
+def settings(run: RunFiles) -> str:
+    """All settings and package versions, folded away."""
+    packages = run.environment.get("packages")
+    groups = {"Settings of the run": run.config, "All package versions": packages}
+    return "".join(
+        f"<details><summary>{title}</summary>{_facts(_flat(values))}</details>"
+        for title, values in groups.items()
+        if isinstance(values, Mapping) and values
+    )
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
+    flat: dict[str, object] = {}
+    for key, value in values.items():
+        flat |= (
+            _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": str(value)}
+        )
+    return flat

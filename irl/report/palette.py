@@ -1,0 +1,53 @@
+"""Colours and the quiet frame that every figure shares.
+
+The strata keep one colour in all figures. The hues were chosen to stay apart under the common
+colour blindnesses and to have a contrast of 3 or more on the light and the dark page.
+"""
+
+import plotly.graph_objects as go
+
+STRATA = {"expert": "#2f7fc1", "policy": "#d9730d", "random": "#7d8590"}
+STRATUM_NAMES = {"expert": "held-out expert", "policy": "policy", "random": "random"}
+DEMONSTRATIONS = "#3fa796"
+CHANGES = {"offset": "#d8b441", "scale": "#3fa796", "shape": "#9a55a8"}
+ACCENT = "#9a55a8"
+INK = "#808080"
+"""Readable on white and on black; the page's style sheet replaces it by the page's own ink."""
+GRID = "rgba(128,128,128,0.22)"
+FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif"
+
+
+def faded(colour: str, alpha: float) -> str:
+    """The colour `#rrggbb` with an opacity, as CSS writes it."""
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{alpha:g})"
+
+
+def framed(figure: go.Figure, x: str, y: str, height: int = 380) -> go.Figure:
+    """The figure with axis titles, a legend above it and no background of its own."""
+    axis = {
+        "gridcolor": GRID,
+        "linecolor": INK,
+        "zeroline": False,
+        "automargin": True,
+        "title": {"standoff": 10, "font": {"size": 13}},
+        "ticks": "outside",
+        "tickcolor": GRID,
+    }
+    figure.update_xaxes(**axis, showgrid=False, showline=True)
+    figure.update_yaxes(**axis)
+    figure.update_xaxes(title_text=x)
+    figure.update_yaxes(title_text=y)
+    figure.update_layout(
+        template=go.layout.Template(),
+        height=height,
+        margin={"l": 10, "r": 14, "t": 10, "b": 10},
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
+        font={"family": FONT, "size": 13, "color": INK},
+        legend={"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"},
+        hoverlabel={"bgcolor": "#ffffff", "bordercolor": INK, "font": {"color": "#1a1a1a"}},
+        # a finger on a figure scrolls the page
+        dragmode=False,
+    )
+    return figure

@@ -1,0 +1,184 @@
+"""The figures of a report: numbers in, plotly figure out; no file is read and no page is written."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from irl.report.folder import column, finite
+from irl.report.palette import ACCENT, CHANGES, DEMONSTRATIONS, INK, STRATA, STRATUM_NAMES, faded, framed
+from irl.report.readings import amount
+
+STEPS = "environment steps"
+LINE_POINTS = 2000
+"""More points than this on one line are thinned; no screen shows them."""
+TICKS = 14
+"""Most labels under the bars."""
+SCATTER_POINTS = 2000
+"""Most points of one stratum in the scatter."""
+
+
+def learning_curve(metrics: Sequence[Mapping[str, Any]], references: Mapping[str, float]) -> go.Figure:
+    """Return against environment steps: training episodes thin, evaluation with markers.
+
+    Args:
+        metrics: lines of metrics.jsonl.
+        references: return_mean of `expert`, `demonstrations` and `random`, of those that are known.
+    """
+    figure = go.Figure()
+    x, y = _thinned(*column(metrics, "env_steps", "return_mean"))
+    colour = STRATA["policy"]
+    figure.add_scatter(
+        x=x, y=y, name="training episodes", mode="lines", line_width=1, line_color=faded(colour, 0.6)
+    )
+    x, y = column(metrics, "env_steps", "eval_return_mean")
+    if x:
+        figure.add_scatter(
+            x=x,
+            y=y,
+            name="evaluation",
+            mode="lines+markers",
+            line_width=2.5,
+            marker_size=7,
+            line_color=colour,
+        )
+    last = max((finite(row.get("env_steps")) or 0.0 for row in metrics), default=0.0)
+    # the demonstrations often lie on the expert: dots over a line show both
+    dotted = {"color": DEMONSTRATIONS, "dash": "3px,8px", "width": 3}
+    for name, value in references.items():
+        line = dotted if name == "demonstrations" else {"color": STRATA[name], "width": 1.5}
+        label = f"{name} {amount(value)}"
+        figure.add_scatter(
+            x=[0, last], y=[value, value], name=label, mode="lines", line=line, hoverinfo="skip"
+        )
+    figure.update_layout(hovermode="x")
+    figure.update_traces(hovertemplate="%{y:,.0f}", selector={"hoverinfo": None})
+    return framed(figure, STEPS, "return of an episode").update_yaxes(tickformat=",")
+
+
+def reward_by_stratum(
+    snapshots: Sequence[object], strata: Mapping[str, Mapping[str, Sequence[object]]]
+) -> go.Figure:
+    """Median learned reward of each stratum with its 10 to 90 % band, a point a snapshot."""
+    bands, lines = [], []
+    for name in STRATA:
+        rows = _complete_rows(
+            snapshots, *(strata.get(name, {}).get(key, []) for key in ("p10", "median", "p90"))
+        )
+        if not rows:
+            continue
+        x, low, middle, high = (list(values) for values in zip(*rows, strict=True))
+        fill = {"fill": "toself", "fillcolor": faded(STRATA[name], 0.18), "line_width": 0}
+        hidden = {"hoverinfo": "skip", "showlegend": False}
+        bands.append(go.Scatter(x=x + x[::-1], y=high + low[::-1], mode="lines", **fill, **hidden))
+        label = STRATUM_NAMES[name]
+        look = {"line": {"color": STRATA[name], "width": 2}, "marker": {"size": 6}, "mode": "lines+markers"}
+        hover = f"{label} %{{y:.3g}}<extra></extra>"
+        lines.append(go.Scatter(x=x, y=middle, name=label, **look, hovertemplate=hover))
+    # every line above every band
+    figure = go.Figure([*bands, *lines]).update_layout(hovermode="x")
+    return framed(figure, STEPS, "learned reward of a step")
+
+
+def learned_against_hand_written(
+    learned: Sequence[object], hand_written: Sequence[object], stratum: Sequence[object]
+) -> go.Figure:
+    """A point a step: the hand-written reward across, the learned one up, coloured by stratum."""
+    figure = go.Figure()
+    for name in ("random", "policy", "expert"):
+        ours = [i for i, group in enumerate(stratum) if group == name]
+        points = _complete_rows([hand_written[i] for i in ours], [learned[i] for i in ours])
+        if not points:
+            continue
+        kept = np.array(points[:: _stride(len(points), SCATTER_POINTS)], dtype=np.float32)
+        marker = {"size": 5, "color": faded(STRATA[name], 0.45)}
+        figure.add_scatter(
+            x=kept[:, 0], y=kept[:, 1], name=STRATUM_NAMES[name], mode="markers", marker=marker
+        )
+    # points overlap and are faint: the legend shows them as large as the eye needs
+    figure.update_layout(legend_itemsizing="constant", legend_traceorder="reversed")
+    figure.update_traces(hovertemplate="hand-written %{x:.3g}<br>learned %{y:.3g}")
+    return framed(figure, "hand-written reward of a step", "learned reward of a step", height=460)
+
+
+def what_moved(changes: Sequence[Mapping[str, Any]]) -> go.Figure:
+    """A bar a pair of neighbouring snapshots: the total change above, its three shares below."""
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.4, 0.6], vertical_spacing=0.07)
+    rows = [row for row in changes if all(finite(row.get(k)) is not None for k in ("to", "total", *CHANGES))]
+    places = list(range(len(rows)))
+    labels = [_short(float(row["to"])) for row in rows]
+    spans = [f"{_short(finite(row.get('from')) or 0.0)} to {_short(float(row['to']))} steps" for row in rows]
+    total = [float(row["total"]) for row in rows]
+    figure.add_bar(
+        x=places, y=total, marker_color=INK, showlegend=False, customdata=spans, row=1, col=1,
+        hovertemplate="%{customdata}: %{y:.3g}<extra></extra>",
+    )  # fmt: skip
+    for name, colour in CHANGES.items():
+        share = [
+            100 * float(row[name]) / size if size > 0 else None for row, size in zip(rows, total, strict=True)
+        ]
+        figure.add_bar(
+            x=places, y=share, name=name, marker_color=colour, row=2, col=1,
+            hovertemplate=f"{name} %{{y:.0f}} %<extra></extra>",
+        )  # fmt: skip
+    framed(figure, "", "", height=480)
+    figure.update_layout(barmode="stack", bargap=0.25, legend_traceorder="normal")
+    every = _stride(len(rows), TICKS) or 1
+    figure.update_xaxes(tickvals=places[::every], ticktext=labels[::every])
+    figure.update_xaxes(title_text="change up to this environment step", row=2, col=1)
+    figure.update_yaxes(title_text="change (reward²)", nticks=4, row=1, col=1)
+    figure.update_yaxes(title_text="share of the change", ticksuffix=" %", range=[0, 100], row=2, col=1)
+    positive = [size for size in total if size > 0]
+    if positive and max(positive) > 50 * min(positive):
+        figure.update_yaxes(type="log", dtick=1, exponentformat="power", row=1, col=1)
+    return figure
+
+
+def discriminator_health(
+    metrics: Sequence[Mapping[str, Any]], snapshots: Sequence[object], auroc: Sequence[object]
+) -> go.Figure:
+    """Accuracy on expert and on policy steps as it trains, with AUROC on the probe at the snapshots."""
+    figure = go.Figure()
+    for name in ("expert", "policy"):
+        x, y = _thinned(*column(metrics, "env_steps", f"discriminator/accuracy_{name}"))
+        if x:
+            figure.add_scatter(x=x, y=_percent(y), name=f"accuracy on {name} steps", mode="lines")
+            figure.data[-1].line = {"color": STRATA[name], "width": 2}
+    rows = _complete_rows(snapshots, auroc)
+    if rows:
+        x, y = (list(values) for values in zip(*rows, strict=True))
+        figure.add_scatter(x=x, y=_percent(y), name="AUROC on the probe", mode="lines+markers", marker_size=6)
+        figure.data[-1].line = {"color": ACCENT, "width": 1.5, "dash": "dot"}
+    figure.update_traces(hovertemplate="%{y:.1f} %")
+    figure.add_hline(y=50, line={"color": INK, "width": 1, "dash": "dash"})
+    framed(figure, STEPS, "steps told apart")
+    figure.update_layout(hovermode="x")
+    return figure.update_yaxes(range=[0, 103], ticksuffix=" %")
+
+
+def _complete_rows(*columns: Sequence[object]) -> list[tuple[float, ...]]:
+    """The rows of which every entry is a finite number."""
+    rows = [tuple(finite(value) for value in row) for row in zip(*columns, strict=False)]
+    return [tuple(value for value in row if value is not None) for row in rows if None not in row]
+
+
+def _stride(n: int, most: int) -> int:
+    return -(-n // most)
+
+
+def _thinned(x: list[float], y: list[float]) -> tuple[list[float], list[float]]:
+    step = _stride(len(x), LINE_POINTS) or 1
+    return x[::step], y[::step]
+
+
+def _percent(shares: list[float]) -> list[float]:
+    return [100 * share for share in shares]
+
+
+def _short(steps: float) -> str:
+    for unit, letter in ((1e6, "M"), (1e3, "k")):
+        if steps >= unit:
+            return f"{steps / unit:.{0 if steps >= 10 * unit else 1}f}".removesuffix(".0") + letter
+    return f"{steps:.0f}"

@@ -1,0 +1,65 @@
+"""The evaluation as `irl evaluate` prints it: key numbers, then the reward by kind of play."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich import box
+from rich.console import Group
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from irl.report.folder import lookup, number, texts
+from irl.report.palette import STRATA, STRATUM_NAMES
+from irl.report.readings import MISSING, amount, key_numbers, spread
+
+
+def evaluation_table(evaluation: Mapping[str, Any]) -> Group:
+    """What to print of an evaluation.json that was read: two tables and the notes.
+
+    Strings of the file are shown as they are: markup in them is not followed.
+    """
+    parts: list[Table | Padding] = [_numbers(evaluation)]
+    if isinstance(lookup(evaluation, "reward.strata"), Mapping):
+        parts.append(_strata(evaluation))
+    for part in ("policy.notes", "reward.notes", "drift.notes", "notes"):
+        parts += [
+            Padding(Text(f"Note: {note}", style="dim"), (0, 1)) for note in texts(lookup(evaluation, part))
+        ]
+    return Group(*parts)
+
+
+def _numbers(evaluation: Mapping[str, Any]) -> Table:
+    names = [str(evaluation[key]) for key in ("run", "method", "env_id") if evaluation.get(key)]
+    steps = number(evaluation, "env_steps")
+    title = ", ".join(names + ([] if steps is None else [f"{steps:,.0f} steps"]))
+    table = Table(box=box.SIMPLE_HEAD, title=Text(title, style="bold"), title_justify="left", expand=False)
+    table.add_column("measured")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("what it says", ratio=1)
+    for row in key_numbers(evaluation):
+        known = row.value != MISSING
+        value = Text(row.value, style="bold" if known else "dim")
+        table.add_row(Text(row.name), value, Text(row.reading, style="" if known else "dim"))
+    return table
+
+
+def _strata(evaluation: Mapping[str, Any]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("mean reward of a step")
+    for name in ("learned", "hand-written", "steps"):
+        table.add_column(name, justify="right")
+    for name in STRATA:
+        path = f"reward.strata.{name}"
+        mean, hand_written = (
+            number(evaluation, f"{path}.mean"),
+            number(evaluation, f"{path}.hand_written_mean"),
+        )
+        steps = number(evaluation, f"{path}.steps")
+        table.add_row(
+            STRATUM_NAMES[name],
+            MISSING if mean is None else spread(mean, number(evaluation, f"{path}.std")),
+            MISSING if hand_written is None else amount(hand_written),
+            MISSING if steps is None else f"{steps:,.0f}",
+        )
+    return table
