@@ -178,6 +178,18 @@ def test_the_randomness_rule_sees(source, global_draw, monkeypatch):
     assert any(found) == global_draw
 
 
+def test_every_protocol_can_be_checked_when_the_tests_run():
+    found = [
+        where(file, node.lineno)
+        for file in FILES
+        for node in ast.walk(tree(file))
+        if isinstance(node, ast.ClassDef)
+        and "Protocol" in {ast.unparse(base).split("[")[0] for base in node.bases}
+        if "runtime_checkable" not in {ast.unparse(decorator) for decorator in node.decorator_list}
+    ]
+    assert found == [], "beartype refuses a protocol that is not @runtime_checkable"
+
+
 def test_the_public_names_are_few_sorted_and_there():
     irl = importlib.import_module("irl")
     names = list(getattr(irl, "__all__", []))
