@@ -37,9 +37,9 @@ def learning(run: RunFiles) -> Panel:
     known = {who: number(run.evaluation, f"references.{who}.return_mean") for who in _REFERENCES}
     references = {who: value for who, value in known.items() if value is not None}
     text = (
-        "The hand-written return, which the policy never saw: the thin line is the exploring policy"
+        "The return that the task pays and the learner never sees: the thin line is the exploring policy"
         + ("; the markers are the deterministic policy on starts of its own" if evaluated else "")
-        + ("; it should climb from the random line to the expert's." if len(references) > 1 else ".")
+        + ("; it should climb to the expert's line." if "expert" in references else ".")
     )
     return Panel(anchor, title, text, plots.learning_curve(run.metrics, references))
 

@@ -104,16 +104,16 @@ def learned_against_hand_written(
 
 
 def what_moved(changes: Sequence[Mapping[str, Any]]) -> go.Figure:
-    """A bar a pair of neighbouring snapshots: the total change above, its three shares below."""
+    """From each snapshot to the next: the total change above, its three shares below."""
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.4, 0.6], vertical_spacing=0.07)
     rows = [row for row in changes if all(finite(row.get(k)) is not None for k in ("to", "total", *CHANGES))]
     places = list(range(len(rows)))
     labels = [_short(float(row["to"])) for row in rows]
     spans = [f"{_short(finite(row.get('from')) or 0.0)} to {_short(float(row['to']))} steps" for row in rows]
     total = [float(row["total"]) for row in rows]
-    figure.add_bar(
-        x=places, y=total, marker_color=INK, showlegend=False, customdata=spans, row=1, col=1,
-        hovertemplate="%{customdata}: %{y:.3g}<extra></extra>",
+    figure.add_scatter(
+        x=places, y=total, mode="lines+markers", line_color=INK, marker_size=7, showlegend=False,
+        customdata=spans, hovertemplate="%{customdata}: %{y:.3g}<extra></extra>", row=1, col=1,
     )  # fmt: skip
     for name, colour in CHANGES.items():
         share = [
@@ -128,7 +128,7 @@ def what_moved(changes: Sequence[Mapping[str, Any]]) -> go.Figure:
     every = _stride(len(rows), TICKS) or 1
     figure.update_xaxes(tickvals=places[::every], ticktext=labels[::every])
     figure.update_xaxes(title_text="change up to this environment step", row=2, col=1)
-    figure.update_yaxes(title_text="change (reward²)", nticks=4, row=1, col=1)
+    figure.update_yaxes(title_text="change (reward²)", nticks=4, rangemode="tozero", row=1, col=1)
     figure.update_yaxes(title_text="share of the change", ticksuffix=" %", range=[0, 100], row=2, col=1)
     positive = [size for size in total if size > 0]
     if positive and max(positive) > 50 * min(positive):
