@@ -9,24 +9,26 @@ reward of a `RewardFn`, and the value of the observation that a time limit cut o
 reward (SB3 adds it to the environment's while it collects), and the advantages are computed anew.
 
 Differs from the paper: observations are normalised inside the policy; rewards are scaled by the running
-standard deviation of their discounted return.
+standard deviation of their discounted return; the exported policy may be a moving average of the weights,
+w' <- c w' + (1 - c) w after each round (Polyak & Juditsky 1992 average iterates; here with a window).
 """
 
-import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from gymnasium.spaces import Box
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
-from irl.core.nets import ACTIVATIONS, Normaliser
+from irl.core.nets import Normaliser
 from irl.core.types import Metrics, RewardFn, Transitions
+from irl.learners.averaging import WeightAverage
+from irl.learners.features import NormalisedFeatures
+from irl.learners.random_state import read_global, write_global
 from irl.learners.vec import RecordingVecEnv
 from irl.policies.policy import Policy, PolicySpec
 from irl.rewards.normalise import ReturnScale
@@ -61,6 +63,8 @@ class PPOConfig:
     """Width of each hidden layer of policy and value, tanh between."""
     log_std_init: float = -0.5
     """Logarithm of the first standard deviation of the actions."""
+    average: float = 0.0
+    """Decay a round of the moving average of weights that is exported; 0 exports the newest."""
 
     def __post_init__(self) -> None:
         if self.steps_per_round % self.n_envs or self.steps_per_round % self.batch_size:
@@ -68,20 +72,9 @@ class PPOConfig:
                 f"steps_per_round ({self.steps_per_round}) must be a multiple of n_envs ({self.n_envs}) "
                 f"and of batch_size ({self.batch_size})"
             )
-        if not 0.0 <= self.gamma < 1.0:
-            raise ValueError(f"gamma must be in [0, 1), not {self.gamma}")
-
-
-class NormalisedFeatures(BaseFeaturesExtractor):
-    """The observation normaliser as SB3's feature extractor, so that it travels with the policy."""
-
-    def __init__(self, observation_space: Any, normaliser: Normaliser | None = None) -> None:
-        super().__init__(observation_space, features_dim=observation_space.shape[0])
-        self.normaliser = normaliser or Normaliser(observation_space.shape[0])
-
-    def forward(self, obs: Float[Tensor, "B O"]) -> Float[Tensor, "B O"]:
-        """Normalised observations."""
-        return self.normaliser(obs)
+        for name in ("gamma", "average"):
+            if not 0.0 <= (value := getattr(self, name)) < 1.0:
+                raise ValueError(f"{name} must be in [0, 1), not {value}")
 
 
 class PPOLearner:
@@ -131,6 +124,7 @@ class PPOLearner:
             device=device,
         )
         self.model.set_logger(Logger(folder=None, output_formats=[]))
+        self._average = WeightAverage(_actor_weights(self.model), config.average)
         _, self._callback = self.model._setup_learn(total_steps, callback=None)
 
     @property
@@ -157,7 +151,7 @@ class PPOLearner:
         """One rollout of the current policy, time-major; actions as the environment saw them."""
         model = self.model
         model.collect_rollouts(self.venv, self._callback, model.rollout_buffer, model.n_steps)
-        self._batch = self.venv.take()
+        self._batch = self.venv.take().to(model.device)
         return self._batch
 
     def improve(self, reward: RewardFn) -> Metrics:
@@ -173,6 +167,7 @@ class PPOLearner:
         # SB3's train() reads the remaining progress for its schedules
         self.model._update_current_progress_remaining(self.env_steps, self.total_steps)
         self.model.train()
+        self._average.update(_actor_weights(self.model))
         if self._running:
             # after the gradient steps: within a round, old and new log pi see one normaliser
             self._normaliser.update(batch.obs)
@@ -210,19 +205,14 @@ class PPOLearner:
 
     def policy(self) -> Policy:
         """The current policy, exported: a copy that later updates leave alone."""
-        net, spaces = self.model.policy, self.venv
-        layers = [m for m in net.mlp_extractor.policy_net if isinstance(m, nn.Linear)]
-        assert isinstance(net.action_net, nn.Linear)
-        weights = {"obs_mean": self._normaliser.mean, "obs_std": self._normaliser.std}
-        weights |= {"log_std": net.log_std}
-        for i, layer in enumerate([*layers, net.action_net]):
-            weights |= {f"layers.{i}.weight": layer.weight, f"layers.{i}.bias": layer.bias}
-        arrays = {name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()}
-        arrays |= {"action_low": spaces.action_space.low, "action_high": spaces.action_space.high}  # pyright: ignore[reportAttributeAccessIssue]
-        activation = next(name for name, kind in ACTIVATIONS.items() if kind is net.activation_fn)
-        sizes = (self._normaliser.mean.shape[0], net.action_net.out_features)
-        spec = PolicySpec(self.env_id, *sizes, self.config.hidden, activation, "gaussian")
-        return Policy(spec, arrays)
+        normaliser, box = self._normaliser, self.venv.action_space
+        assert isinstance(box, Box)
+        weights = {name: weight.numpy().copy() for name, weight in self._average.weights.items()}
+        weights |= {"obs_mean": normaliser.mean.cpu().numpy().copy(), "obs_std": normaliser.std.cpu().numpy()}
+        weights |= {"action_low": box.low, "action_high": box.high}
+        sizes = (len(normaliser.mean), len(box.low))
+        spec = PolicySpec(self.env_id, *sizes, self.config.hidden, "tanh", "gaussian")
+        return Policy(spec, weights)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on, between two rounds."""
@@ -235,9 +225,9 @@ class PPOLearner:
             "last_obs": model._last_obs,
             "last_starts": model._last_episode_starts,
             "scale": self._scale.state_dict(),
+            "average": self._average.state_dict(),
             "environments": self.venv.state_dict(),
-            # SB3 samples from these
-            "global_random": (torch.get_rng_state(), np.random.get_state(), random.getstate()),
+            "global_random": read_global(),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
@@ -248,12 +238,10 @@ class PPOLearner:
         model.num_timesteps, model._n_updates = state["steps"], state["updates"]
         model._last_obs, model._last_episode_starts = state["last_obs"], state["last_starts"]
         self._scale.load_state_dict(state["scale"])
+        self._average.load_state_dict(state["average"])
         self.venv.load_state_dict(state["environments"])
         self.venv.resume_from(state["last_obs"])
-        torch_state, numpy_state, python_state = state["global_random"]
-        torch.set_rng_state(torch_state)
-        np.random.set_state(numpy_state)
-        random.setstate(python_state)
+        write_global(state["global_random"])
 
     def close(self) -> None:
         """Close the environments."""
@@ -264,3 +252,14 @@ def _schedule(config: PPOConfig) -> float | Callable[[float], float]:
     if config.lr_schedule == "constant":
         return config.lr
     return lambda remaining: config.lr * remaining
+
+
+def _actor_weights(model: PPO) -> dict[str, Tensor]:
+    """The weights that make the policy act, under the names that `Policy` has for them."""
+    net = model.policy
+    layers = [m for m in net.mlp_extractor.policy_net if isinstance(m, nn.Linear)]
+    assert isinstance(net.action_net, nn.Linear)
+    weights: dict[str, Tensor] = {"log_std": net.log_std}
+    for i, layer in enumerate([*layers, net.action_net]):
+        weights |= {f"layers.{i}.weight": layer.weight, f"layers.{i}.bias": layer.bias}
+    return {name: weight.detach().cpu() for name, weight in weights.items()}
