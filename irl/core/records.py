@@ -41,7 +41,7 @@ class RunFolder:
                 break
         return rows
 
-    def append(self, row: Mapping[str, float | None]) -> None:
+    def append(self, row: Mapping[str, int | float | None]) -> None:
         """Add a line to `metrics.jsonl`; a number that is not finite is written as null.
 
         Raises:

@@ -55,6 +55,8 @@ def _encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     if isinstance(value, torch.Tensor | np.ndarray):
         kind = "tensor" if isinstance(value, torch.Tensor) else "array"
         content = value.detach().cpu().numpy() if isinstance(value, torch.Tensor) else value
+        if content.dtype.kind not in "biuf":
+            raise TypeError(f"cannot save an array of {content.dtype}: {value!r:.80}")
         name = str(len(arrays))
         arrays[name] = np.ascontiguousarray(content).reshape(content.shape)
         return {"": kind, "of": name}
