@@ -1,6 +1,6 @@
 """A small task with a known expert: go to the origin of a plane.
 
-    x' = clip(x + 0.2 a, +-2),   reward = -|x|,   40 steps
+    x' = clip(x + 0.06 a, +-1.5),   reward = -|x|,   30 steps
 
 Staying alive pays nothing, so a reward that only rewards survival teaches nothing. `Cliff-v0` is the same
 but ends the episode where |x_1| > 1, and `NaNReward-v0` is the same with a reward of NaN.
@@ -16,14 +16,14 @@ from irl.core.types import Episode
 from irl.envs.rollouts import rollouts
 from irl.policies.policy import Policy, PolicySpec
 
-STEPS = 40
+STEPS = 30
 
 
 class PointMass(gym.Env):
     """The task of this module; every reset draws a start in [-1, 1]^2."""
 
     def __init__(self, cliff: float = np.inf, reward: float | None = None) -> None:
-        self.observation_space = Box(-2.0, 2.0, (2,), np.float64)
+        self.observation_space = Box(-1.5, 1.5, (2,), np.float64)
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
         self._cliff, self._reward = cliff, reward
 
@@ -34,17 +34,17 @@ class PointMass(gym.Env):
 
     def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict]:
         # noise in the step, so that a replay that forgets the generator is caught
-        push = 0.2 * np.asarray(action, dtype=np.float64) + self.np_random.normal(0.0, 0.01, 2)
-        self._x = np.clip(self._x + push, -2.0, 2.0)
+        push = 0.06 * np.asarray(action, dtype=np.float64) + self.np_random.normal(0.0, 0.01, 2)
+        self._x = np.clip(self._x + push, -1.5, 1.5)
         reward = -float(np.linalg.norm(self._x)) if self._reward is None else self._reward
         return self._x.copy(), reward, bool(abs(self._x[0]) > self._cliff), False, {}
 
 
 def _register(env_id: str, **kwargs: float) -> None:
     if env_id not in gym.registry:
-        gym.register(
-            env_id, entry_point=PointMass, max_episode_steps=STEPS, kwargs=kwargs, disable_env_checker=True
-        )
+        # by name, so that a dataset can record how to make it
+        entry = "tests.pointmass:PointMass"
+        gym.register(env_id, entry, max_episode_steps=STEPS, kwargs=kwargs, disable_env_checker=True)
 
 
 _register("PointMass-v0")

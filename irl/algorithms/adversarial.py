@@ -7,7 +7,7 @@ each round:  batch  <- learner.collect()
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 
@@ -33,6 +33,7 @@ class ScheduleConfig:
         return self.warm_up_epochs if index < self.warm_up_rounds else self.epochs
 
 
+@runtime_checkable
 class Discriminator(Protocol):
     """What tells the expert from the policy, and rewards the likeness."""
 

@@ -1,7 +1,7 @@
 """What every training loop shares: the record of a round, and what a learner can do."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.policies.policy import Policy
@@ -18,6 +18,7 @@ class Round:
     metrics: Metrics
 
 
+@runtime_checkable
 class Learner(Protocol):
     """What improves a policy: collects steps, is told their reward, learns from it."""
 

@@ -3,6 +3,11 @@
 A run folder refuses a name that is not here, so a curve is never without an explanation.
 """
 
+from collections.abc import Mapping
+
+Row = Mapping[str, int | float | None]
+"""The numbers of one round by declared name; None where there is none yet."""
+
 DECLARED: dict[str, tuple[str, str]] = {
     "round": ("rounds of the loop, counted from 1", "rounds"),
     "env_steps": ("environment steps taken so far, over all environments", "steps"),

@@ -1,12 +1,14 @@
 """Curves for TensorBoard, in the run folder's tensorboard/."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from irl.core.metrics import Row
+
 
 @contextmanager
-def curves(run: Path, write: bool = True) -> Iterator[Callable[[Mapping[str, float | None]], None]]:
+def curves(run: Path, write: bool = True) -> Iterator[Callable[[Row], None]]:
     """A function that adds a row of metrics to the curves; does nothing unless `write`."""
     if not write:
         yield lambda row: None
@@ -15,7 +17,7 @@ def curves(run: Path, write: bool = True) -> Iterator[Callable[[Mapping[str, flo
 
     with SummaryWriter(str(run / "tensorboard")) as writer:
 
-        def draw(row: Mapping[str, float | None]) -> None:
+        def draw(row: Row) -> None:
             steps = row["env_steps"]
             assert steps is not None
             for name, value in row.items():

@@ -10,11 +10,12 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from irl.algorithms.loop import Learner, Round
+from irl.core.metrics import Row
 from irl.core.records import RunFolder, snapshot_steps
 from irl.core.rng import episode_seeds
 from irl.core.types import Metrics
@@ -27,6 +28,7 @@ RECENT = 20
 """Training episodes that `return_mean` is the mean of."""
 
 
+@runtime_checkable
 class Algorithm(Protocol):
     """What can be played."""
 
@@ -102,11 +104,11 @@ class Player:
                 if asked() and learner.env_steps < self.steps:
                     raise Interrupted
 
-    def _row(self, round_: Round, wall_s: float) -> dict[str, float | None]:
+    def _row(self, round_: Round, wall_s: float) -> Row:
         self._recent.extend(self.algorithm.learner.take_finished())
         returns = [value for value, _ in self._recent]
         lengths = [length for _, length in self._recent]
-        row: dict[str, float | None] = {
+        row: Row = {
             "round": round_.index,
             "env_steps": round_.env_steps,
             "wall_s": round(wall_s, 3),

@@ -1,11 +1,13 @@
 """What a person sees while it trains: a bar on a terminal, a line now and then elsewhere."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from irl.core.metrics import Row
 
 Report = Callable[[int, str], None]
 """Called with how far it is and a few words."""
@@ -28,7 +30,7 @@ def progress(what: str, total: int, start: int = 0, show: bool = True) -> Iterat
         yield _lines(console, what, total, start)
 
 
-def training_words(row: Mapping[str, float | None], steps_per_s: float) -> str:
+def training_words(row: Row, steps_per_s: float) -> str:
     """Steps per second, returns and discriminator accuracy of a row of metrics."""
     words = [f"{steps_per_s:.0f} steps/s"]
     for name, label in (("return_mean", "return"), ("eval_return_mean", "eval")):

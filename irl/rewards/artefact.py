@@ -7,7 +7,7 @@ learner did (`reward_scale` in the specification records that). No pickle is rea
 """
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from irl.core import files
+from irl.core.config import from_json
 from irl.core.errors import UserError
 from irl.core.nets import Normaliser
 from irl.core.types import Transitions
@@ -96,14 +97,13 @@ def load_reward(path: Path | str) -> LearnedReward:
     folder = _reward_folder(Path(path))
     content = files.read_json(folder / SPEC)
     try:
+        if not isinstance(content, dict):
+            raise TypeError(f"expected an object in {SPEC}, found {content!r:.80}")
         if (content.pop("format"), version := content.pop("version")) != (FORMAT, VERSION):
             raise ValueError(f"expected format {FORMAT} {VERSION}, found version {version}")
-        content.pop("weights_sha256")
-        net_spec = content["net"] | {"hidden": tuple(content["net"]["hidden"])}
-        names = {field.name for field in fields(RewardSpec)}
-        if set(content) != names:
-            raise ValueError(f"unexpected or missing keys: {sorted(set(content) ^ names)}")
-        spec = RewardSpec(**content | {"net": LogitSpec(**net_spec)})
+        if (digest := files.sha256(folder / WEIGHTS)) != (named := content.pop("weights_sha256")):
+            raise ValueError(f"{WEIGHTS} has sha256 {digest[:12]}, {SPEC} says {named!r:.14}")
+        spec = from_json(RewardSpec, content, SPEC)
         if spec.reward_map not in MAPS:
             raise ValueError(f"unknown map {spec.reward_map!r}; known: {', '.join(MAPS)}")
         net = LogitNet(spec.net, Normaliser(spec.net.obs_dim), torch.Generator())

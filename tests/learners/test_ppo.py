@@ -1,5 +1,6 @@
 """What Stable-Baselines3 does to a reward, and what must be undone when the reward comes afterwards."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -82,7 +83,7 @@ def test_advantages_are_those_of_a_slow_oracle_on_the_learned_reward() -> None:
 
 
 def test_the_batch_holds_the_clipped_actions_and_the_library_the_unclipped_ones() -> None:
-    ours = learner(config=PPOConfig(**vars(SMALL) | {"log_std_init": 1.0}))
+    ours = learner(config=replace(SMALL, log_std_init=1.0))
     batch = ours.collect()
     stored = torch.from_numpy(ours.model.rollout_buffer.actions).reshape(-1, 2)
     assert (stored.abs() > 1).any()
@@ -132,7 +133,7 @@ def test_improving_twice_on_one_rollout_is_refused() -> None:
 
 
 def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(tmp_path: Any) -> None:
-    config = PPOConfig(**vars(SMALL) | {"lr_schedule": "linear", "average": 0.5})
+    config = replace(SMALL, lr_schedule="linear", average=0.5)
     straight = learner("Cliff-v0", config, normaliser=None)
     for round_ in range(6):
         straight.collect()

@@ -5,7 +5,7 @@ import numpy as np
 import torch
 
 from irl.learners.vec import RecordingVecEnv
-from tests import pointmass  # noqa: F401  (registers the tasks)
+from tests import pointmass
 
 SEEDS = [3, 5]
 

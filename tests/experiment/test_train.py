@@ -1,0 +1,125 @@
+"""`irl train` end to end on a small task: the run folder, resuming, and that watching changes nothing."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from irl.core import files
+from irl.core.records import open_run
+from irl.experiment import play
+from irl.policies.policy import load_policy
+from irl.rewards.artefact import load_reward
+from tests.experiment.conftest import TASK
+
+Train = Callable[..., Path]
+Command = Callable[..., None]
+
+
+def final_weights(run: Path) -> dict[str, np.ndarray]:
+    last = list(open_run(run).snapshots().values())[-1]
+    reward = {name: value.numpy() for name, value in load_reward(last).net.state_dict().items()}
+    return {**load_policy(last / "policy.safetensors").weights, **reward}
+
+
+def equal(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:
+    return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
+
+
+def timeless(run: Path) -> list[dict]:
+    rows = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    return [{name: value for name, value in row.items() if name != "wall_s"} for row in rows]
+
+
+def test_a_run_folder_explains_itself(train: Train) -> None:
+    run = train("run")
+    config = files.read_json(run / "config.json")
+    assert (config["kind"], config["env_id"], config["learner"]["kind"]) == ("gail", TASK, "ppo")
+    assert config["demos"] == "irl/pointmass/expert-v0"
+    environment = files.read_json(run / "environment.json")
+    assert {"packages", "device", "threads", "git_commit", "git_dirty", "command"} <= set(environment)
+    drawn = files.read_json(run / "demonstrations.json")
+    assert sorted(drawn["episodes"] + drawn["held_out"]) == list(range(6))
+    assert len(drawn["episodes"]) == 4
+    assert list(open_run(run).snapshots()) == [0, 128, 256, 384, 640, 768]
+    assert any((run / "tensorboard").iterdir())
+    rows = open_run(run).metrics()
+    assert [row["round"] for row in rows] == [1, 2, 3, 4, 5, 6]
+    assert [row["env_steps"] for row in rows] == [128 * i for i in range(1, 7)]
+    assert {"round", "env_steps", "wall_s", "return_mean"} <= set(rows[0])
+    assert ["eval_return_mean" in row for row in rows] == [False, True] * 3
+
+
+def test_the_same_seed_gives_the_same_run_and_another_seed_another_one(train: Train) -> None:
+    runs = [train("a"), train("b"), train("c", "--seed", "1")]
+    assert equal(final_weights(runs[0]), final_weights(runs[1]))
+    assert timeless(runs[0]) == timeless(runs[1])
+    assert not equal(final_weights(runs[0]), final_weights(runs[2]))
+
+
+def test_watching_changes_no_weight(train: Train) -> None:
+    watched = train("watched", "--watch.checkpoint-every-s", "0")
+    quiet = train("quiet", "--watch.eval-episodes", "0", "--watch.no-tensorboard")
+    assert equal(final_weights(watched), final_weights(quiet))
+
+
+def test_config_json_repeats_the_run(train: Train, irl: Command) -> None:
+    first = train("first")
+    irl("train", "--config", first / "config.json", "--out", "again")
+    assert equal(final_weights(first), final_weights(Path("again")))
+    assert timeless(first) == timeless(Path("again"))
+
+
+@pytest.mark.parametrize("stop_at", [1, 4])
+def test_a_run_that_died_is_resumed_to_the_same_end(
+    train: Train, irl: Command, monkeypatch: pytest.MonkeyPatch, stop_at: int
+) -> None:
+    straight = train("straight")
+
+    class Died(Exception):
+        pass
+
+    def die(row: dict, steps_per_s: float) -> str:
+        if row["round"] == stop_at + 1:
+            raise Died
+        return ""
+
+    with monkeypatch.context() as patched:
+        # a checkpoint after every round; the death comes after the next one's metrics are written
+        patched.setattr(play, "training_words", die)
+        with pytest.raises(Died):
+            train("died", "--watch.checkpoint-every-s", "0")
+    assert len(timeless(Path("died"))) == stop_at + 1
+    irl("train", "--resume", "died")
+    assert timeless(straight) == timeless(Path("died"))
+    assert equal(final_weights(straight), final_weights(Path("died")))
+
+
+def test_asked_to_stop_it_checkpoints_and_says_how_to_go_on(
+    train: Train, irl: Command, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
+) -> None:
+    straight = train("straight")
+
+    def ask(row: dict, steps_per_s: float) -> str:
+        if row["round"] == 3:
+            play.signal.raise_signal(play.signal.SIGTERM)
+        return ""
+
+    with monkeypatch.context() as patched:
+        patched.setattr(play, "training_words", ask)
+        with pytest.raises(SystemExit) as stopped:
+            train("stopped")
+    assert stopped.value.code == 130
+    assert "irl train --resume stopped" in capfd.readouterr().err
+    irl("train", "--resume", "stopped")
+    assert equal(final_weights(straight), final_weights(Path("stopped")))
+
+
+def test_a_finished_run_resumes_to_itself(train: Train, irl: Command) -> None:
+    run = train("run")
+    before = final_weights(run), timeless(run)
+    irl("train", "--resume", run)
+    assert equal(before[0], final_weights(run))
+    assert before[1] == timeless(run)
