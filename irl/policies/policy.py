@@ -107,13 +107,16 @@ class Policy:
         expected |= {"action_low": sizes[-1:], "action_high": sizes[-1:]}
         for i, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
             expected |= {f"layers.{i}.weight": (outputs, inputs), f"layers.{i}.bias": (outputs,)}
+        if "log_std" in self.weights:
+            expected["log_std"] = sizes[-1:]
+        else:
+            expected |= {"log_std.weight": (sizes[-1], sizes[-2]), "log_std.bias": sizes[-1:]}
         for name, shape in expected.items():
             found = self.weights[name].shape if name in self.weights else None
             if found != shape:
                 raise ValueError(f"{name}: expected shape {shape}, found {found}")
-        log_std = {"log_std"} if "log_std" in self.weights else {"log_std.weight", "log_std.bias"}
-        if set(self.weights) != set(expected) | log_std:
-            raise ValueError(f"unexpected weights: {sorted(set(self.weights) ^ (set(expected) | log_std))}")
+        if unexpected := sorted(set(self.weights) - set(expected)):
+            raise ValueError(f"unexpected weights: {unexpected}")
 
 
 def save_policy(policy: Policy, path: Path) -> None:

@@ -80,7 +80,7 @@ def write(folder: Path, policy: Policy, card: Card) -> None:
 
 
 def _load(path: Path, card: Card) -> Shelved:
-    digest = files.sha256(path / POLICY)
+    digest = files.sha256(path / POLICY) if (path / POLICY).is_file() else "missing"
     if digest != card.weights_sha256:
         raise UserError(
             f"{path / POLICY} is not the file its card describes (sha256 {digest[:12]}, the card says "
