@@ -28,7 +28,8 @@ help:  ## this list
 install: $(STAMP)  ## make .venv with irl and its tools in it (the others do this by themselves)
 
 quickstart: $(STAMP)  ## demonstrations, GAIL on Hopper, evaluation and a report
-	$(VENV)/bin/irl demos generate --env-id Hopper-v5 --episodes 25 --seed 0
+	@# A second quickstart learns from the demonstrations of the first.
+	$(VENV)/bin/irl demos show irl/hopper/expert-v0 2>/dev/null || $(VENV)/bin/irl demos generate --env-id Hopper-v5 --episodes 25 --seed 0
 	$(VENV)/bin/irl train gail --env-id Hopper-v5 --demos irl/hopper/expert-v0 --demo-episodes 4 --steps $(STEPS) --seed $(SEED) --out $(OUT)
 	$(VENV)/bin/irl evaluate $(OUT)
 
