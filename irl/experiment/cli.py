@@ -1,5 +1,7 @@
 """The command line: one table of commands, each a frozen dataclass that tyro reads."""
 
+import contextlib
+import io
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -46,13 +48,22 @@ def _dispatch(words: list[str]) -> None:
     for n in (2, 1):
         if (name := tuple(words[:n])) in COMMANDS and len(name) == n:
             cls, run = COMMANDS[name]
-            try:
-                command = tyro.cli(cls, args=words[n:], prog=f"irl {' '.join(name)}")
-            except ValueError as error:
-                raise UserError(str(error)) from error
-            run(command)
+            run(_parsed(cls, words[n:], f"irl {' '.join(name)}"))
             return
     _overview(words)
+
+
+def _parsed(cls: type, words: list[str], program: str) -> Any:
+    """The command that the words say; tyro's boxed complaint as one line."""
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.cli(cls, args=words, prog=program)
+    except SystemExit as stop:
+        if stop.code in (0, None):
+            raise
+        frame = str.maketrans(dict.fromkeys("╭╮╰╯│─┌┐└┘", " "))
+        raise UserError(complaint.getvalue().translate(frame)) from None
 
 
 def _overview(words: list[str]) -> None:

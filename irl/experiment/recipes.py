@@ -13,13 +13,15 @@ class Recipe:
     learner: PPOConfig
 
 
-_PPO = PPOConfig(lr_schedule="linear")
+# The newest weights fall over in two of five episodes at one evaluation and in none at the next; their
+# average over some 100k steps does not flicker so.
+_PPO = PPOConfig(lr_schedule="linear", average=0.98)
 
 DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_000_000, _PPO)}
 """For a task without a row of its own, by algorithm."""
 
 RECIPES: dict[tuple[str, str], Recipe] = {
-    ("Hopper-v5", "ppo"): Recipe(3_000_000, _PPO),
+    ("Hopper-v5", "ppo"): Recipe(1_500_000, _PPO),
 }
 """By task and algorithm."""
 
