@@ -67,8 +67,13 @@ def new_folder(path: Path) -> Iterator[Path]:
         yield aside
         os.chmod(aside, 0o755)
         if path.exists():
-            shutil.rmtree(path)
-        os.rename(aside, path)
+            # moved, not deleted, until the new one has its place
+            replaced = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
+            os.rename(path, replaced)
+            os.rename(aside, path)
+            shutil.rmtree(replaced)
+        else:
+            os.rename(aside, path)
     except BaseException:
         shutil.rmtree(aside, ignore_errors=True)
         raise

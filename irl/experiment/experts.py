@@ -68,7 +68,7 @@ class EvaluateExpert:
     episodes: int = EPISODES
     """How many episodes."""
     seed: int = 0
-    """Draws the episodes; 0 repeats those of the card."""
+    """Draws the episodes; 20 of seed 0 are those of the card."""
     policies_root: Path | None = None
     """Where the shelf is; expert_data/policies unless given."""
 

@@ -121,8 +121,9 @@ class Policy:
 
 def save_policy(policy: Policy, path: Path) -> None:
     """Write the policy; `load_policy(path)` acts the same to the bit."""
-    header = {"format": FORMAT, "version": str(VERSION), "spec": json.dumps(asdict(policy.spec))}
-    files.write_bytes(path, save(policy.weights, metadata=header))
+    header = json.dumps({"format": FORMAT, "version": VERSION, "spec": asdict(policy.spec)})
+    # one key: safetensors writes several in a random order, and equal policies should be equal files
+    files.write_bytes(path, save(policy.weights, metadata={"irl": header}))
 
 
 def load_policy(path: Path | str) -> Policy:
@@ -137,13 +138,13 @@ def load_policy(path: Path | str) -> Policy:
         raise UserError(f"no policy file {path}")
     try:
         with safe_open(path, framework="numpy") as file:
-            header = file.metadata() or {}
+            header = json.loads((file.metadata() or {}).get("irl", "{}"))
             weights = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        if (header.get("format"), header.get("version")) != (FORMAT, str(VERSION)):
+        if (header.get("format"), header.get("version")) != (FORMAT, VERSION):
             raise ValueError(
                 f"expected format {FORMAT} {VERSION}, found {header.get('format')} {header.get('version')}"
             )
-        spec = json.loads(header["spec"])
+        spec = header["spec"]
         return Policy(PolicySpec(**spec | {"hidden": tuple(spec["hidden"])}), weights)
-    except (SafetensorError, KeyError, TypeError, ValueError) as error:
+    except (SafetensorError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise UserError(f"{path} is not a policy this version reads: {error}") from error

@@ -53,7 +53,9 @@ def test_the_value_behind_a_time_limit_is_added_on_the_learned_reward() -> None:
 def test_nothing_is_added_where_the_task_ended_the_episode() -> None:
     ours = learner("Cliff-v0")
     # pushed to one side, so that episodes end at the cliff
-    torch.nn.init.constant_(ours.model.policy.action_net.bias, 1.0)
+    bias = ours.model.policy.action_net.bias
+    assert isinstance(bias, torch.Tensor)
+    torch.nn.init.constant_(bias, 1.0)
     batch = ours.collect()
     ours._give_rewards(batch, ones)
     given = torch.from_numpy(ours.model.rollout_buffer.rewards).flatten()

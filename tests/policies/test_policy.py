@@ -171,7 +171,7 @@ def test_any_reader_of_safetensors_finds_the_weights_and_what_they_mean(tmp_path
     for name, value in weights_of(spec()).items():
         np.testing.assert_array_equal(found[name], value.astype(np.float32))
     with safe_open(tmp_path / "p.safetensors", framework="numpy") as file:
-        assert file.metadata() == HEADER
+        assert json.loads(file.metadata()["irl"]) == HEADER
 
 
 @pytest.mark.parametrize(
@@ -206,34 +206,34 @@ def test_an_unknown_kind_of_policy_is_refused(changes: dict[str, str]) -> None:
         a_policy(**changes)
 
 
-HEADER = {
-    "format": FORMAT,
-    "version": str(VERSION),
-    "spec": json.dumps(
-        {
-            "env_id": "Test-v0",
-            "obs_dim": 3,
-            "action_dim": 2,
-            "hidden": [6, 5],
-            "activation": "tanh",
-            "distribution": "gaussian",
-        }
-    ),
+SPEC: dict[str, Any] = {
+    "env_id": "Test-v0",
+    "obs_dim": 3,
+    "action_dim": 2,
+    "hidden": [6, 5],
+    "activation": "tanh",
+    "distribution": "gaussian",
 }
+HEADER: dict[str, Any] = {"format": FORMAT, "version": VERSION, "spec": SPEC}
 
 
-def changed_spec(**changes: Any) -> dict[str, str]:
-    return HEADER | {"spec": json.dumps(json.loads(HEADER["spec"]) | changes)}
+def packed(header: Any) -> dict[str, str]:
+    return {"irl": json.dumps(header)}
+
+
+def changed_spec(**changes: Any) -> dict[str, Any]:
+    return HEADER | {"spec": SPEC | changes}
 
 
 @pytest.mark.parametrize(
     ("header", "message"),
     [
         (HEADER | {"format": "irl.reward"}, "expected format irl.policy 1, found irl.reward 1"),
-        (HEADER | {"version": "2"}, "expected format irl.policy 1, found irl.policy 2"),
-        (None, "expected format irl.policy 1, found None None"),
+        (HEADER | {"version": 2}, "expected format irl.policy 1, found irl.policy 2"),
+        ({}, "expected format irl.policy 1, found None None"),
+        ([], "not a policy"),
         (HEADER | {"spec": "{"}, "not a policy"),
-        (HEADER | {"spec": "[]"}, "not a policy"),
+        (HEADER | {"spec": []}, "not a policy"),
         ({name: HEADER[name] for name in ("format", "version")}, "spec"),
         (changed_spec(extra=1), "extra"),
         (changed_spec(obs_dim=4), "obs_mean"),
@@ -245,9 +245,9 @@ def changed_spec(**changes: Any) -> dict[str, str]:
 def test_a_file_that_says_it_is_something_else_is_refused(tmp_path: Path, header, message: str) -> None:
     path = tmp_path / "p.safetensors"
     content = {name: value.astype(np.float32) for name, value in weights_of(spec()).items()}
-    path.write_bytes(save(content, metadata=HEADER))
+    path.write_bytes(save(content, metadata=packed(HEADER)))
     load_policy(path)
-    path.write_bytes(save(content, metadata=header))
+    path.write_bytes(save(content, metadata=packed(header)))
     with pytest.raises(UserError, match=message) as caught:
         load_policy(path)
     assert str(path) in str(caught.value)
@@ -258,9 +258,16 @@ def test_a_file_without_a_weight_is_refused_by_name(tmp_path: Path) -> None:
     save_policy(a_policy(), path)
     content = load(path.read_bytes())
     for name in content:
-        path.write_bytes(save({k: v for k, v in content.items() if k != name}, metadata=HEADER))
+        path.write_bytes(save({k: v for k, v in content.items() if k != name}, metadata=packed(HEADER)))
         with pytest.raises(UserError, match=name):
             load_policy(path)
+
+
+def test_equal_policies_are_equal_files(tmp_path: Path) -> None:
+    # a card knows its policy by the hash of the file
+    for name in ("a", "b", "c", "d"):
+        save_policy(a_policy(), tmp_path / name)
+    assert len({(tmp_path / name).read_bytes() for name in ("a", "b", "c", "d")}) == 1
 
 
 class Payload:
