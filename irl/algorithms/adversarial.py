@@ -59,6 +59,7 @@ class Adversarial:
         self.learner, self.discriminator = learner, discriminator
         self.expert, self.schedule, self.rng = expert, schedule, rng
         self.index = 0
+        learner.start(discriminator.reward)
 
     def rounds(self, steps: int) -> Iterator[Round]:
         """Play until `steps` environment steps are taken; the last round may go past them."""

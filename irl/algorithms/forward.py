@@ -16,6 +16,7 @@ class Forward:
     def __init__(self, learner: Learner, reward: RewardFn) -> None:
         self.learner, self.reward = learner, reward
         self.index = 0
+        learner.start(reward)
 
     def rounds(self, steps: int) -> Iterator[Round]:
         """Learn until `steps` environment steps are taken; the last round may go past them."""

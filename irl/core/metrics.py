@@ -32,5 +32,8 @@ DECLARED: dict[str, tuple[str, str]] = {
     "ppo/clip_fraction": ("share of probability ratios beyond the clip range", "1"),
     "ppo/value_loss": ("squared error of the value, scaled reward", "1"),
     "ppo/explained_variance": ("share of the return's variance that the value explains", "1"),
+    "sac/actor_loss": ("the actor's loss at the round's last update", "scaled return"),
+    "sac/critic_loss": ("the critics' loss at the round's last update", "squared return"),
+    "sac/ent_coef": ("temperature of the entropy bonus at the round's last update", "reward"),
     "ppo/std": ("standard deviation of the actions, mean over their dimensions", "action"),
 }

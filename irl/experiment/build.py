@@ -9,7 +9,8 @@ from irl.core.rng import episode_seeds, torch_stream
 from irl.core.types import Transitions
 from irl.discriminators.gail import GAIL
 from irl.experiment.configs import ExpertRun, GAILRun
-from irl.learners.ppo import PPOLearner
+from irl.learners.ppo import PPOConfig, PPOLearner
+from irl.learners.sac import SACConfig, SACLearner
 from irl.rewards.mujoco import HandWritten
 
 
@@ -39,13 +40,13 @@ def adversarial(config: GAILRun, expert: Transitions) -> Adversarial:
 
 
 def forward(config: ExpertRun) -> Forward:
-    """PPO on the task's own reward, with observations normalised as they come."""
-    learner = PPOLearner(
-        config.env_id,
-        episode_seeds(config.seed, "training", config.learner.n_envs),
-        config.learner,
-        seed=config.seed,
-        total_steps=config.steps,
-        device=config.device,
-    )
+    """PPO, with observations normalised as they come, or SAC on the task's own reward."""
+    run = {"seed": config.seed, "total_steps": config.steps, "device": config.device}
+    match config.learner:
+        case PPOConfig() as settings:
+            seeds = episode_seeds(config.seed, "training", settings.n_envs)
+            learner = PPOLearner(config.env_id, seeds, settings, **run)
+        case SACConfig() as settings:
+            seeds = episode_seeds(config.seed, "training", 1)
+            learner = SACLearner(config.env_id, seeds, settings, **run)
     return Forward(learner, HandWritten())

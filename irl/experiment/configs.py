@@ -8,6 +8,7 @@ from irl.algorithms.adversarial import ScheduleConfig
 from irl.discriminators.gail import GAILConfig
 from irl.envs.tasks import task_name
 from irl.learners.ppo import PPOConfig
+from irl.learners.sac import SACConfig
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class ExpertRun:
     steps: int
     seed: int
     out: Path
-    learner: PPOConfig
+    learner: PPOConfig | SACConfig
     watch: Watch
     device: Literal["cpu", "cuda"]
     threads: int

@@ -38,7 +38,7 @@ class TrainExpert:
 
     env_id: str
     """Gymnasium id of the task."""
-    algo: Literal["ppo"] = "ppo"
+    algo: Literal["ppo", "sac"] = "ppo"
     """Which learner."""
     steps: int | None = None
     """Environment steps; the recipe's unless given."""

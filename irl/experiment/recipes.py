@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from irl.learners.ppo import PPOConfig
+from irl.learners.sac import SACConfig
 
 
 @dataclass(frozen=True)
@@ -10,20 +11,22 @@ class Recipe:
     """An algorithm's settings and how long it runs."""
 
     steps: int
-    learner: PPOConfig
+    learner: PPOConfig | SACConfig
 
 
 # The newest weights fall over in two of five episodes at one evaluation and in none at the next; their
 # average over some 100k steps does not flicker so.
 _PPO = PPOConfig(lr_schedule="linear", average=0.98)
 
-DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_000_000, _PPO)}
+_SAC = SACConfig(lr_schedule="linear", average=0.98)
+
+DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_500_000, _PPO), "sac": Recipe(1_000_000, _SAC)}
 """For a task without a row of its own, by algorithm."""
 
 RECIPES: dict[tuple[str, str], Recipe] = {
     ("Hopper-v5", "ppo"): Recipe(1_500_000, _PPO),
 }
-"""By task and algorithm."""
+"""By task and algorithm; a row here made a shipped expert."""
 
 
 def recipe(env_id: str, algo: str) -> Recipe:

@@ -13,7 +13,6 @@ standard deviation of their discounted return; the exported policy may be a movi
 w' <- c w' + (1 - c) w after each round (Polyak & Juditsky 1992 average iterates; here with a window).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -29,6 +28,7 @@ from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
 from irl.learners.random_state import read_global, write_global
+from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
 from irl.policies.policy import Policy, PolicySpec
 from irl.rewards.normalise import ReturnScale
@@ -105,7 +105,7 @@ class PPOLearner:
         self.model = PPO(
             "MlpPolicy",
             self.venv,
-            learning_rate=_schedule(config),
+            learning_rate=learning_rate(config.lr, config.lr_schedule),
             n_steps=config.steps_per_round // config.n_envs,
             batch_size=config.batch_size,
             n_epochs=config.n_epochs,
@@ -146,6 +146,9 @@ class PPOLearner:
         extractor = self.model.policy.features_extractor
         assert isinstance(extractor, NormalisedFeatures)
         return extractor.normaliser
+
+    def start(self, reward: RewardFn) -> None:
+        """Nothing: a rollout is rewarded after it is collected."""
 
     def collect(self) -> Transitions:
         """One rollout of the current policy, time-major; actions as the environment saw them."""
@@ -246,12 +249,6 @@ class PPOLearner:
     def close(self) -> None:
         """Close the environments."""
         self.venv.close()
-
-
-def _schedule(config: PPOConfig) -> float | Callable[[float], float]:
-    if config.lr_schedule == "constant":
-        return config.lr
-    return lambda remaining: config.lr * remaining
 
 
 def _actor_weights(model: PPO) -> dict[str, Tensor]:

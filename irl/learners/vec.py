@@ -48,6 +48,8 @@ class RecordingVecEnv(VecEnvWrapper):
         given, rewards, dones, infos = self.venv.step_wait()
         obs = _flat(given)
         next_obs, truncated = obs.copy(), np.zeros(len(dones), dtype=bool)
+        for info, reward in zip(infos, rewards, strict=True):
+            info["own_reward"] = reward
         for i in np.flatnonzero(dones).tolist():
             next_obs[i] = infos[i]["terminal_observation"]
             truncated[i] = infos[i]["TimeLimit.truncated"]

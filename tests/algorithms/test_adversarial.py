@@ -25,6 +25,9 @@ class Told:
         self.env_steps, self.reward_scale = 0, 1.0
         self._batch = from_episodes(pointmass.demonstrations(1))
 
+    def start(self, reward: RewardFn) -> None:
+        self.calls.append("start")
+
     def collect(self) -> Transitions:
         self.calls.append("collect")
         self.env_steps += len(self._batch)
@@ -62,7 +65,7 @@ def test_the_discriminator_learns_before_the_rollout_is_rewarded() -> None:
     loop = Adversarial(told, told, expert, schedule, torch_stream(0, "minibatches"))
     rounds = list(loop.rounds(2 * pointmass.STEPS))
     # 30 steps are two minibatches of 15: two passes in the warm-up, then one
-    first = ["collect", *["update 15 15"] * 4, "improve", "reward"]
+    first = ["start", "collect", *["update 15 15"] * 4, "improve", "reward"]
     assert told.calls == [*first, "collect", *["update 15 15"] * 2, "improve", "reward"]
     assert [(r.index, r.env_steps) for r in rounds] == [(1, 30), (2, 60)]
     assert rounds[0].metrics["discriminator/loss"] == 1.0

@@ -1,0 +1,103 @@
+"""SAC rewarded as batches are drawn: in the right units, with the right ends, never stale."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from irl.core import state
+from irl.core.types import Transitions
+from irl.learners.sac import SACConfig, SACLearner
+from irl.rewards.mujoco import HandWritten
+from tests import pointmass  # noqa: F401 (registers the tasks)
+
+SMALL = SACConfig(steps_per_round=100, learning_starts=150, batch_size=32, hidden=(16,), buffer_size=1000)
+
+
+def learner(env_id: str = "Cliff-v0", config: SACConfig = SMALL, seed: int = 0) -> SACLearner:
+    return SACLearner(env_id, [seed], config, seed=seed, total_steps=600)
+
+
+def weights(of: SACLearner) -> dict[str, Tensor]:
+    return {name: value.clone() for name, value in of.model.policy.state_dict().items()}
+
+
+def test_a_drawn_batch_is_judged_in_environment_units_with_its_ends() -> None:
+    seen: list[Transitions] = []
+
+    def remember(batch: Transitions) -> Tensor:
+        seen.append(batch)
+        return batch.obs[:, 0]
+
+    ours = learner("Pendulum-v1")  # actions within +-2
+    ours.start(remember)
+    steps = ours.collect()
+    drawn = ours._replay.sample(64)
+    (batch,) = seen
+    assert batch.action.abs().max() > 1.5
+    torch.testing.assert_close(drawn.actions, batch.action / 2.0)
+    torch.testing.assert_close(drawn.rewards[:, 0], batch.obs[:, 0])
+    rows = {tuple(np.round(row, 4)) for row in torch.cat([steps.obs, steps.action], 1).tolist()}
+    assert {tuple(np.round(row, 4)) for row in torch.cat([batch.obs, batch.action], 1).tolist()} <= rows
+
+
+def test_a_time_limit_is_no_termination_and_the_next_observation_is_the_true_one() -> None:
+    ours = learner("PointMass-v0")
+    ours.start(HandWritten())
+    steps = ours.collect()
+    assert steps.truncated.any()
+    drawn = ours._replay.sample(500)
+    assert (drawn.dones == 0).all()
+    rows = {tuple(np.round(row, 4)) for row in torch.cat([steps.obs, steps.next_obs], 1).tolist()}
+    pairs = torch.cat([drawn.observations, drawn.next_observations], 1)
+    assert {tuple(np.round(row, 4)) for row in pairs.tolist()} <= rows
+
+
+def test_the_environments_own_reward_is_there_for_a_reward_that_asks() -> None:
+    ours = learner()
+    ours.start(HandWritten())
+    steps = ours.collect()
+    assert steps.reward is not None
+    drawn = ours._replay.sample(200).rewards[:, 0]
+    known = set(np.round(steps.reward.numpy(), 4))
+    assert set(np.round(drawn.double().numpy(), 4)) <= known
+
+
+def test_nan_from_the_environment_leaves_the_weights_bit_equal() -> None:
+    ends = []
+    for env_id in ("PointMass-v0", "NaNReward-v0"):
+        ours = learner(env_id)
+        ours.start(lambda batch: -batch.next_obs.norm(dim=1))
+        for _ in range(3):
+            ours.collect()
+        ends.append(weights(ours))
+    assert all(torch.equal(ends[0][name], ends[1][name]) for name in ends[0])
+
+
+def test_the_exported_policy_acts_as_the_library_predicts() -> None:
+    ours = learner("Pendulum-v1")
+    exported = ours.policy()
+    for obs in np.random.default_rng(0).normal(size=(10, 3)):
+        predicted, _ = ours.model.predict(obs.astype(np.float32), deterministic=True)
+        np.testing.assert_allclose(exported(obs), predicted, atol=1e-5)
+
+
+def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(tmp_path: Path) -> None:
+    config = replace(SMALL, lr_schedule="linear", average=0.5)
+    straight = learner(config=config)
+    straight.start(HandWritten())
+    for round_ in range(5):
+        straight.collect()
+        if round_ == 2:
+            state.save(tmp_path, straight.state_dict())
+    torch.manual_seed(99)
+    resumed = learner(config=config)
+    resumed.load_state_dict(state.load(tmp_path))
+    resumed.start(HandWritten())
+    for _ in range(2):
+        resumed.collect()
+    ours, theirs = weights(straight), weights(resumed)
+    assert all(torch.equal(ours[name], theirs[name]) for name in ours)
+    assert straight.env_steps == resumed.env_steps == 500
