@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 import torch
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -191,19 +192,18 @@ def list_experts(command: ListExperts) -> None:
 
 
 def _table(rows: list[tuple[Card, Measurement]]) -> Table:
-    columns = ("task", "level", "algorithm", "steps", "return", "min", "length", "min", "random", "episodes")
-    table = Table(*columns, title="deterministic policies, undiscounted return (mean ± std over episodes)")
+    n = rows[0][1].episodes if rows else 0
+    title = f"deterministic policies over {n} episodes: return mean ± std, worst; length mean (shortest)"
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for column in ("task", "made by", "return", "worst", "length", "random"):
+        table.add_column(column, no_wrap=True)
     for card, m in rows:
         table.add_row(
-            card.env_id,
-            card.level,
-            card.algorithm,
-            f"{card.steps:,}",
+            card.env_id if card.level == "expert" else f"{card.env_id} {card.level}",
+            f"{card.algorithm} {card.steps / 1e6:g}M",
             f"{m.return_mean:.1f} ± {m.return_std:.1f}",
             f"{m.return_min:.1f}",
-            f"{m.length_mean:.0f}",
-            str(m.length_min),
+            f"{m.length_mean:.0f} ({m.length_min})",
             f"{card.random_return_mean:.1f}",
-            str(m.episodes),
         )
     return table

@@ -1,0 +1,88 @@
+"""`irl experts`: a policy is trained, measured, shelved, listed, and measured again."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from irl.core import files
+from irl.experiment import recipes
+from irl.learners.ppo import PPOConfig
+from irl.learners.sac import SACConfig
+from irl.policies import shelf
+
+Command = Callable[..., None]
+FIXED_NAMES = {
+    "env_id",
+    "algorithm",
+    "steps",
+    "seed",
+    "return_mean",
+    "return_std",
+    "return_min",
+    "return_max",
+    "length_min",
+    "episodes",
+    "random_return_mean",
+    "weights_sha256",
+}
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Recipes that take a second."""
+    ppo = PPOConfig(n_envs=2, steps_per_round=128, batch_size=64, n_epochs=1, hidden=(8,))
+    sac = SACConfig(steps_per_round=100, learning_starts=100, batch_size=16, hidden=(8,))
+    rows = {"ppo": recipes.Recipe(256, ppo), "sac": recipes.Recipe(200, replace(sac, average=0.5))}
+    monkeypatch.setattr(recipes, "DEFAULTS", rows)
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac"])
+def test_an_expert_is_trained_measured_and_shelved(irl: Command, algo: str) -> None:
+    words = ("--env-id", "Cliff-v0", "--algo", algo, "--policies-root", "shelf", "--watch.no-progress")
+    irl("experts", "train", *words)
+    card = files.read_json(Path("shelf/cliff/expert/card.json"))
+    assert set(card) >= FIXED_NAMES
+    assert (card["env_id"], card["algorithm"], card["episodes"]) == ("Cliff-v0", algo, 20)
+    assert len(card["episode_seeds"]) == len(set(card["episode_seeds"])) == 20
+    found = shelf.find("Cliff-v0", root=Path("shelf"))
+    assert found.card.measured.return_mean == card["return_mean"]
+
+
+def test_the_shelf_is_listed_and_measured_again_to_the_same_numbers(
+    irl: Command, capsys: pytest.CaptureFixture
+) -> None:
+    irl("experts", "list")
+    listed = capsys.readouterr().out
+    assert "PointMass-v0" in listed
+    irl("experts", "evaluate", "--env-id", "PointMass-v0")
+    measured = capsys.readouterr().out
+    assert "PointMass-v0" in measured
+
+
+def test_what_is_on_the_shelf_is_not_replaced_unasked(irl: Command, capsys: pytest.CaptureFixture) -> None:
+    words = ["experts", "train", "--env-id", "Cliff-v0", "--policies-root", "shelf", "--watch.no-progress"]
+    irl(*words)
+    first = Path("shelf/cliff/expert/policy.safetensors").read_bytes()
+    irl(*words, "--seed", "1")
+    assert "kept" in capsys.readouterr().out
+    assert Path("shelf/cliff/expert/policy.safetensors").read_bytes() == first
+    irl(*words, "--seed", "2", "--overwrite")
+    assert Path("shelf/cliff/expert/policy.safetensors").read_bytes() != first
+
+
+def test_the_same_command_again_goes_on_and_ends_the_same(irl: Command) -> None:
+    words = ["experts", "train", "--env-id", "Cliff-v0", "--policies-root", "shelf", "--watch.no-progress"]
+    irl(*words, "--out", "run")
+    first = Path("run/policy/policy.safetensors").read_bytes()
+    irl(*words, "--out", "run")
+    assert Path("run/policy/policy.safetensors").read_bytes() == first
+
+
+def test_other_settings_do_not_go_on_in_a_run_of_these(irl: Command, capfd: pytest.CaptureFixture) -> None:
+    words = ["experts", "train", "--env-id", "Cliff-v0", "--policies-root", "shelf", "--watch.no-progress"]
+    irl(*words, "--out", "run")
+    with pytest.raises(SystemExit):
+        irl(*words, "--out", "run", "--seed", "5")
+    assert "seed" in capfd.readouterr().err.splitlines()[-1]
