@@ -7,8 +7,8 @@ PYTHON ?= python3
 VENV := .venv
 STAMP := $(VENV)/.installed
 
-STEPS ?= 122880
-SEED ?= 0
+STEPS ?= 245760
+SEED ?= 1
 ifndef OUT
 OUT := runs/quickstart-$(shell date +%Y%m%d-%H%M%S)
 endif
@@ -23,7 +23,7 @@ PYTEST := OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n $(WORKERS) --dist
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do printf '  make %-12s %s\n' "$$name" "$$text"; done
-	@echo '  settings: PYTHON=python3.12  STEPS=122880  SEED=0  OUT=runs/NAME'
+	@echo '  settings: PYTHON=python3.12  STEPS=245760  SEED=1  OUT=runs/NAME'
 
 install: $(STAMP)  ## make .venv with irl and its tools in it (the others do this by themselves)
 

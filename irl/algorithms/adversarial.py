@@ -21,16 +21,9 @@ class ScheduleConfig:
 
     batch_size: int = 256
     """Expert and policy transitions of one gradient step, each."""
-    warm_up_rounds: int = 5
-    """Rounds at the start in which it learns longer, so that the first rewards mean something."""
-    warm_up_epochs: int = 20
-    """Passes over each rollout in those rounds."""
     epochs: int = 5
-    """Passes over each rollout afterwards."""
-
-    def epochs_at(self, index: int) -> int:
-        """Passes over the rollout of the round `index`, counted from 0."""
-        return self.warm_up_epochs if index < self.warm_up_rounds else self.epochs
+    """Passes over each rollout. With too few D stays behind the policy and leads it astray (its loss is
+    then above log 4); with many in the first rounds it is certain before the policy can follow."""
 
 
 @runtime_checkable
@@ -74,7 +67,7 @@ class Adversarial:
     def _fit(self, policy: Transitions) -> Metrics:
         updates = [
             self.discriminator.update(self.expert.sample(len(batch), self.rng), batch)
-            for _ in range(self.schedule.epochs_at(self.index))
+            for _ in range(self.schedule.epochs)
             for batch in policy.minibatches(self.schedule.batch_size, self.rng)
         ]
         means = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]}

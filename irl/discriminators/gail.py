@@ -32,7 +32,7 @@ class GAILConfig:
     """Width of each hidden layer, tanh between."""
     lr: float = 1e-3
     """Adam step size."""
-    gradient_penalty: float = 10.0
+    gradient_penalty: float = 5.0
     """Weight of the gradient penalty; 0 turns it off."""
 
 

@@ -38,7 +38,7 @@ class GAILRun:
     """Minari dataset of demonstrations; irl/<task>/expert-v0 unless given."""
     demo_episodes: int = 4
     """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
-    steps: int = 122_880
+    steps: int = 245_760
     """Environment steps in all."""
     seed: int = 0
     """Seed of everything random."""

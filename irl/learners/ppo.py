@@ -39,21 +39,21 @@ class PPOConfig:
     """How the policy is improved."""
 
     KIND: ClassVar[str] = "ppo"
-    n_envs: int = 8
+    n_envs: int = 16
     """Environments stepped side by side."""
     steps_per_round: int = 2048
     """Environment steps of one rollout, over all environments."""
-    batch_size: int = 256
+    batch_size: int = 512
     """Transitions of one gradient step."""
-    n_epochs: int = 10
+    n_epochs: int = 20
     """Passes over each rollout."""
-    lr: float = 3e-4
+    lr: float = 6e-4
     """Adam step size."""
-    lr_schedule: Literal["constant", "linear"] = "constant"
+    lr_schedule: Literal["constant", "linear"] = "linear"
     """`constant`, or `linear` from `lr` to 0 over the run."""
     gamma: float = 0.99
     """Discount per environment step."""
-    gae_lambda: float = 0.95
+    gae_lambda: float = 0.97
     """Weight of longer advantage estimates."""
     clip_range: float = 0.2
     """How far a probability ratio may move."""

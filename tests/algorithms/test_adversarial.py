@@ -60,13 +60,13 @@ class Told:
 
 def test_the_discriminator_learns_before_the_rollout_is_rewarded() -> None:
     told = Told()
-    schedule = ScheduleConfig(batch_size=15, warm_up_rounds=1, warm_up_epochs=2, epochs=1)
+    schedule = ScheduleConfig(batch_size=15, epochs=2)
     expert = from_episodes(pointmass.demonstrations(2))
     loop = Adversarial(told, told, expert, schedule, torch_stream(0, "minibatches"))
     rounds = list(loop.rounds(2 * pointmass.STEPS))
-    # 30 steps are two minibatches of 15: two passes in the warm-up, then one
+    # 30 steps are two minibatches of 15, passed over twice
     first = ["start", "collect", *["update 15 15"] * 4, "improve", "reward"]
-    assert told.calls == [*first, "collect", *["update 15 15"] * 2, "improve", "reward"]
+    assert told.calls == [*first, "collect", *["update 15 15"] * 4, "improve", "reward"]
     assert [(r.index, r.env_steps) for r in rounds] == [(1, 30), (2, 60)]
     assert rounds[0].metrics["discriminator/loss"] == 1.0
     assert rounds[0].metrics["discriminator/accuracy_expert"] == 1.0
@@ -76,7 +76,9 @@ def test_the_discriminator_learns_before_the_rollout_is_rewarded() -> None:
 def _gail(seed: int, trained: bool = True) -> Adversarial:
     expert = from_episodes(pointmass.demonstrations(4))
     normaliser = fitted_normaliser(expert.obs)
-    config = PPOConfig(n_envs=4, steps_per_round=512, batch_size=128, gamma=0.9, hidden=(32,), lr=1e-3)
+    config = PPOConfig(
+        n_envs=4, steps_per_round=512, batch_size=128, n_epochs=10, gamma=0.9, hidden=(32,), lr=1e-3
+    )
     learner = PPOLearner(
         "PointMass-v0", [seed * 10 + i for i in range(4)], config, seed=seed, total_steps=10**6
     )
@@ -89,7 +91,7 @@ def _gail(seed: int, trained: bool = True) -> Adversarial:
         rng=torch_stream(seed, "discriminator"),
     )
     # at 3 passes a round D stays behind the policy (its loss is above log 4) and leads it astray
-    schedule = ScheduleConfig(batch_size=128, warm_up_epochs=20, epochs=10)
+    schedule = ScheduleConfig(batch_size=128, epochs=10)
     return Adversarial(learner, discriminator, expert, schedule, torch_stream(seed, "minibatches"))
 
 
@@ -114,7 +116,7 @@ def test_gail_learns_the_point_mass_to_nine_tenths_of_the_expert() -> None:
 def test_an_untrained_discriminator_does_not_teach_it() -> None:
     # the control: what the test above shows is the discriminator's doing
     loop = _gail(0, trained=False)
-    for _ in loop.rounds(10_240):
+    for _ in loop.rounds(5_120):
         pass
     assert _score(loop) < 0.5
 

@@ -22,7 +22,6 @@ SETTINGS = {
     "learner.hidden": 16,
     "discriminator.hidden": 16,
     "schedule.batch-size": 64,
-    "schedule.warm-up-epochs": 2,
     "schedule.epochs": 1,
     "watch.eval-every": 2,
     "watch.eval-episodes": 2,
