@@ -12,6 +12,7 @@ from typing import Any, Protocol, runtime_checkable
 import torch
 
 from irl.algorithms.loop import Learner, Round
+from irl.core.config import check_at_least
 from irl.core.types import Metrics, Transitions
 
 
@@ -24,6 +25,9 @@ class ScheduleConfig:
     epochs: int = 5
     """Passes over each rollout. With too few D stays behind the policy and leads it astray (its loss is
     then above log 4); with many in the first rounds it is certain before the policy can follow."""
+
+    def __post_init__(self) -> None:
+        check_at_least(self, 1, "batch_size", "epochs")
 
 
 @runtime_checkable

@@ -56,9 +56,9 @@ def random_episodes(env_id: str, n_steps: int, seed: int) -> list[Episode]:
     env = make(env_id)
     try:
         act = random_act(env.action_space, stream(seed, "probe actions"))
-        seeds = iter(episode_seeds(seed, "probe", n_steps))
+        seeds = iter(episode_seeds(seed, "probe", max(n_steps, MOST_EPISODES)))
         episodes, total = [], 0
-        while total < max(n_steps, 1) or len(episodes) < MOST_EPISODES:
+        while total < n_steps or len(episodes) < MOST_EPISODES:
             episodes.append(rollout(env, act, next(seeds)))
             total += len(episodes[-1])
         return episodes

@@ -12,6 +12,30 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from irl.core.errors import UserError
 
+MOST_SEED = 2**32 - 1
+"""numpy's global generator, which SB3 seeds, takes no larger one."""
+
+
+def check_at_least(config: object, least: int, *names: str) -> None:
+    """Refuse settings below `least`.
+
+    Raises:
+        ValueError: one is; it is named with its value.
+    """
+    for name in names:
+        if (value := getattr(config, name)) < least:
+            raise ValueError(f"{name} must be at least {least}, not {value}")
+
+
+def check_seed(seed: int) -> None:
+    """Refuse a seed that some generator would not take.
+
+    Raises:
+        ValueError: it is negative or above 2^32 - 1.
+    """
+    if not 0 <= seed <= MOST_SEED:
+        raise ValueError(f"seed must be in 0 to {MOST_SEED}, not {seed}")
+
 
 def to_json(config: Any) -> Any:
     """The config as JSON values."""

@@ -28,7 +28,7 @@ DECLARED: dict[str, tuple[str, str]] = {
     "discriminator/accuracy_policy": ("share of this rollout's steps called policy, at the round's end", "1"),
     "discriminator/logit_expert": ("mean logit of the demonstrations, at the round's end", "nats"),
     "discriminator/logit_policy": ("mean logit of this rollout, at the round's end", "nats"),
-    "ppo/approx_kl": ("divergence of the old policy from the new one, mean over the round", "nats"),
+    "ppo/approx_kl": ("divergence of the old policy from the new one, mean over the last pass", "nats"),
     "ppo/clip_fraction": ("share of probability ratios beyond the clip range", "1"),
     "ppo/value_loss": ("squared error of the value, scaled reward", "1"),
     "ppo/explained_variance": ("share of the return's variance that the value explains", "1"),

@@ -76,14 +76,21 @@ class RunFolder:
         for old in list(_by_steps(root).values())[:-KEPT_CHECKPOINTS]:
             shutil.rmtree(old)
 
-    def load_checkpoint(self) -> Any | None:
-        """The newest checkpoint, None when there is none.
+    def load_checkpoint(self) -> tuple[Any | None, list[str]]:
+        """The newest checkpoint that can be read, None when there is none; and what was damaged.
 
         Raises:
-            UserError: it is damaged.
+            UserError: there are checkpoints, and none of them can be read.
         """
-        found = list(_by_steps(self.path / "checkpoint").values())
-        return state.load(found[-1]) if found else None
+        damaged: list[str] = []
+        for path in reversed(_by_steps(self.path / "checkpoint").values()):
+            try:
+                return state.load(path), damaged
+            except UserError as error:
+                damaged.append(str(error))
+        if damaged:
+            raise UserError(f"no checkpoint of {self.path} can be read: {'; '.join(damaged)}")
+        return None, damaged
 
 
 def create(path: Path, config: Mapping[str, Any], environment: Mapping[str, Any]) -> RunFolder:

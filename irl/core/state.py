@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import torch
 from safetensors import SafetensorError
-from safetensors.numpy import load_file, save_file
+from safetensors.numpy import load_file
+from safetensors.numpy import save as packed
 
 from irl.core import files
 from irl.core.errors import UserError
@@ -29,7 +30,7 @@ def save(folder: Path, state: Any) -> None:
     arrays: dict[str, np.ndarray] = {}
     structure = _encode(state, arrays)
     folder.mkdir(parents=True, exist_ok=True)
-    save_file(arrays, folder / ARRAYS)
+    files.write_bytes(folder / ARRAYS, packed(arrays))
     files.write_bytes(folder / STRUCTURE, json.dumps(structure).encode())
 
 

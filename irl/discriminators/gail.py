@@ -17,6 +17,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
 from irl.core.types import Metrics, Transitions
 from irl.discriminators import losses, regularisers
@@ -34,6 +35,9 @@ class GAILConfig:
     """Adam step size."""
     gradient_penalty: float = 5.0
     """Weight of the gradient penalty; 0 turns it off."""
+
+    def __post_init__(self) -> None:
+        check_at_least(self, 0, "lr", "gradient_penalty")
 
 
 class GAIL:

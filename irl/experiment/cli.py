@@ -40,7 +40,11 @@ def main(argv: Sequence[str] | None = None) -> None:
         if debug:
             raise
         _fail(str(error))
-    except Interrupted:
+    except OSError as error:
+        if debug:
+            raise
+        _fail(str(error))
+    except (Interrupted, KeyboardInterrupt):
         raise SystemExit(130) from None
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from irl.algorithms.adversarial import ScheduleConfig
+from irl.core.config import check_at_least, check_seed
 from irl.discriminators.gail import GAILConfig
 from irl.envs.tasks import task_name
 from irl.learners.ppo import PPOConfig
@@ -25,6 +26,9 @@ class Watch:
     """Write curves for TensorBoard into the run folder."""
     progress: bool = True
     """Show a progress bar, or a line now and then where there is no terminal."""
+
+    def __post_init__(self) -> None:
+        check_at_least(self, 0, "eval_every", "eval_episodes", "checkpoint_every_s")
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,8 @@ class GAILRun:
     """Threads of torch's operators; results are the same to the bit only at the same number."""
 
     def __post_init__(self) -> None:
-        _positive(self, "demo_episodes", "steps", "threads")
+        check_at_least(self, 1, "demo_episodes", "steps", "threads")
+        check_seed(self.seed)
 
     def resolved(self) -> "GAILRun":
         """The same with every default that depends on another setting filled in."""
@@ -84,10 +89,5 @@ class ExpertRun:
     threads: int
 
     def __post_init__(self) -> None:
-        _positive(self, "steps", "threads")
-
-
-def _positive(config: object, *names: str) -> None:
-    for name in names:
-        if (value := getattr(config, name)) < 1:
-            raise ValueError(f"{name} must be at least 1, not {value}")
+        check_at_least(self, 1, "steps", "threads")
+        check_seed(self.seed)

@@ -7,6 +7,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from irl.core.config import check_at_least, check_seed
 from irl.core.errors import UserError
 from irl.core.rng import episode_seeds
 from irl.demos.generate import generate
@@ -17,6 +18,7 @@ from irl.envs.make import make
 from irl.envs.tasks import task_name
 from irl.experiment.progress import progress
 from irl.policies import shelf
+from irl.policies.card import Card
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,10 @@ class GenerateDemos:
     overwrite: bool = False
     """Replace a dataset of this name."""
 
+    def __post_init__(self) -> None:
+        check_at_least(self, 1, "episodes")
+        check_seed(self.seed)
+
 
 @dataclass(frozen=True)
 class ShowDemos:
@@ -61,8 +67,6 @@ class ListDemos:
 
 def generate_demos(command: GenerateDemos) -> None:
     """Record the episodes and describe the dataset."""
-    if command.episodes < 1:
-        raise UserError(f"--episodes must be at least 1, not {command.episodes}")
     make(command.env_id).close()
     expert = shelf.find(command.env_id, command.level, command.policies_root)
     dataset_id = command.dataset_id or f"irl/{task_name(command.env_id)}/{command.level}-v0"
@@ -77,12 +81,18 @@ def generate_demos(command: GenerateDemos) -> None:
             algorithm=expert.card.algorithm,
             author="irl",
             random_return=expert.card.random_return_mean,
-            expert_return=expert.card.measured.return_mean,
+            expert_return=_reference(command, expert.card),
             description=f"{command.level} of {command.env_id}, deterministic actions, seed {command.seed}",
             on_episode=lambda episode: report(next(done), f"return {episode.return_:.0f}"),
             overwrite=command.overwrite,
         )
     Console().print(_table(info))
+
+
+def _reference(command: GenerateDemos, card: Card) -> float:
+    """The return that counts as one: the expert's, also where a lesser level acts and an expert is there."""
+    known = [c for c in shelf.cards(command.policies_root) if (c.env_id, c.level) == (card.env_id, "expert")]
+    return (known or [card])[0].measured.return_mean
 
 
 def show_demos(command: ShowDemos) -> None:

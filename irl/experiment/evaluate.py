@@ -12,13 +12,14 @@ from rich.console import Console
 
 from irl.algorithms.probe import probe
 from irl.core import files, records
-from irl.core.config import from_json
+from irl.core.config import check_at_least, check_seed, from_json
 from irl.core.errors import UserError
 from irl.core.rng import episode_seeds
 from irl.core.types import Episode
-from irl.demos.load import Demos, load_demos
+from irl.demos.load import Demos
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import GAILRun
+from irl.experiment.draw import drawn_again
 from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.progress import progress
 from irl.policies import shelf
@@ -27,6 +28,8 @@ from irl.policies.policy import load_policy
 from irl.report.html import write_report
 from irl.report.tables import evaluation_table
 from irl.rewards.artefact import load_reward
+
+NO_RETURN = "the task's own reward is not a finite number"
 
 
 @dataclass(frozen=True)
@@ -44,12 +47,14 @@ class Evaluate:
     policies_root: Path | None = None
     """Where the shelf is; expert_data/policies unless given."""
 
+    def __post_init__(self) -> None:
+        check_at_least(self, 1, "episodes")
+        check_seed(self.seed)
+
 
 def evaluate(command: Evaluate) -> None:
     """Evaluate, write, print."""
     folder = records.open_run(command.run)
-    if command.episodes < 1:
-        raise UserError(f"--episodes must be at least 1, not {command.episodes}")
     result = evaluation(folder, command)
     files.write_json(folder.path / "evaluation.json", result)
     report = write_report(folder.path)
@@ -66,7 +71,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     torch.set_num_threads(config.threads)
     steps, last = list(snapshots.items())[-1]
     root = command.datasets_root or config.datasets_root
-    demos = load_demos(config.demos, episodes=config.demo_episodes, seed=config.seed, root=root)
+    demos = drawn_again(config, folder, root)
     episodes = _play(config.env_id, last, command)
     expert = demos.held_out or demos.episodes
     judged = probe(expert, episodes, config.env_id, command.seed)
@@ -108,18 +113,20 @@ def _policy(episodes: Sequence[Episode], references: dict[str, Any]) -> dict[str
         random["return_mean"] if random else None,
         expert["return_mean"] if expert else None,
     )
-    reason = None if np.isfinite(score) else "no expert or random return is known for this task"
+    known = np.isfinite(measured.return_mean)
+    unscored = "no expert or random return is known for this task" if known else NO_RETURN
     return {
-        "return_mean": measured.return_mean,
-        "return_std": measured.return_std,
-        "return_min": measured.return_min,
-        "return_max": measured.return_max,
+        "return_mean": finite(measured.return_mean),
+        "return_mean_reason": None if known else NO_RETURN,
+        "return_std": finite(measured.return_std),
+        "return_min": finite(measured.return_min),
+        "return_max": finite(measured.return_max),
         "normalised_score": finite(score),
-        "normalised_score_reason": reason,
+        "normalised_score_reason": None if np.isfinite(score) else unscored,
         "episodes": measured.episodes,
         "length_mean": measured.length_mean,
         "length_min": measured.length_min,
-        "returns": list(measured.returns),
+        "returns": [finite(value) for value in measured.returns],
         "lengths": list(measured.lengths),
         "seeds": list(measured.episode_seeds),
     }
@@ -145,13 +152,12 @@ def _references(env_id: str, demos: Demos, policies_root: Path | None) -> dict[s
         if demos.random_return is not None:
             random = {"return_mean": demos.random_return, "return_std": None, "source": source}
     measured = summary(list(demos.episodes))
-    shown = {"return_mean": measured.return_mean, "return_std": measured.return_std}
+    shown = {"return_mean": finite(measured.return_mean), "return_std": finite(measured.return_std)}
     shown |= {"episodes": measured.episodes, "source": f"dataset {demos.dataset_id}"}
     return {"expert": expert, "random": random, "demonstrations": shown}
 
 
 def _card(env_id: str, root: Path | None) -> Card | None:
-    try:
-        return shelf.find(env_id, "expert", root).card
-    except UserError:
-        return None
+    known = any((card.env_id, card.level) == (env_id, "expert") for card in shelf.cards(root))
+    # a shelf that holds a damaged expert is an error, one without it is not
+    return shelf.find(env_id, "expert", root).card if known else None

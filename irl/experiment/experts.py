@@ -1,6 +1,7 @@
 """`irl experts`: train a policy on a task's own reward, measure it, put it on the shelf."""
 
 import dataclasses
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from irl.core import records
-from irl.core.config import to_json
+from irl.core.config import check_at_least, check_seed, to_json
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment, versions
 from irl.core.rng import episode_seeds
@@ -19,7 +20,7 @@ from irl.envs.make import make
 from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import ExpertRun, Watch
-from irl.experiment.play import Player
+from irl.experiment.play import Interrupted, Player
 from irl.experiment.progress import progress
 from irl.experiment.recipes import recipe
 from irl.policies import shelf
@@ -57,6 +58,12 @@ class TrainExpert:
     threads: int = 1
     """Threads of torch's operators."""
 
+    def __post_init__(self) -> None:
+        check_at_least(self, 1, "threads")
+        check_seed(self.seed)
+        if self.steps is not None:
+            check_at_least(self, 1, "steps")
+
 
 @dataclass(frozen=True)
 class EvaluateExpert:
@@ -72,6 +79,10 @@ class EvaluateExpert:
     """Draws the episodes; 20 of seed 0 are those of the card."""
     policies_root: Path | None = None
     """Where the shelf is; expert_data/policies unless given."""
+
+    def __post_init__(self) -> None:
+        check_at_least(self, 1, "episodes")
+        check_seed(self.seed)
 
 
 @dataclass(frozen=True)
@@ -99,10 +110,15 @@ def train(command: TrainExpert) -> None:
         snapshot=lambda path: save_policy(algorithm.learner.policy(), path / shelf.POLICY),
     )
     player.resume()
-    player.play()
-    algorithm.learner.close()
-    last = list(folder.snapshots().values())[-1]
-    _shelve(run, load_policy(last / shelf.POLICY), command)
+    try:
+        player.play()
+    except Interrupted:
+        print("stopped; the same command goes on", file=sys.stderr)
+        raise
+    finally:
+        algorithm.learner.close()
+    steps, last = list(folder.snapshots().items())[-1]
+    _shelve(run, load_policy(last / shelf.POLICY), steps, command)
 
 
 def _expert_run(command: TrainExpert) -> ExpertRun:
@@ -111,7 +127,7 @@ def _expert_run(command: TrainExpert) -> ExpertRun:
     return ExpertRun(
         env_id=command.env_id,
         level=command.level,
-        steps=command.steps or chosen.steps,
+        steps=chosen.steps if command.steps is None else command.steps,
         seed=command.seed,
         out=command.out or Path("runs") / f"{command.level}-{task}-{command.algo}-s{command.seed}",
         learner=chosen.learner,
@@ -135,7 +151,7 @@ def _open_or_create(run: ExpertRun) -> records.RunFolder:
     return records.create(run.out, config, environment(command_line(), run.device))
 
 
-def _shelve(run: ExpertRun, policy: Policy, command: TrainExpert) -> None:
+def _shelve(run: ExpertRun, policy: Policy, steps: int, command: TrainExpert) -> None:
     console = Console()
     measured = _measured(run.env_id, policy, EPISODES, 0)
     random = measure_random(run.env_id)
@@ -143,7 +159,7 @@ def _shelve(run: ExpertRun, policy: Policy, command: TrainExpert) -> None:
         env_id=run.env_id,
         level=run.level,
         algorithm=command.algo,
-        steps=run.steps,
+        steps=steps,
         seed=run.seed,
         measured=measured,
         random_return_mean=random.return_mean,
@@ -171,14 +187,12 @@ def _measured(env_id: str, policy: Policy, n: int, seed: int) -> Measurement:
 
 def evaluate(command: EvaluateExpert) -> None:
     """Measure again what the shelf holds and print it beside the cards' means."""
-    chosen = [c for c in shelf.cards(command.policies_root) if command.env_id in (None, c.env_id)]
-    if command.env_id is not None and not chosen:
-        shelf.find(command.env_id, command.level, command.policies_root)
+    root, level = command.policies_root, command.level
+    tasks = [card.env_id for card in shelf.cards(root) if card.level == level]
     rows = []
-    for card in chosen:
-        if card.level == command.level:
-            policy = shelf.find(card.env_id, card.level, command.policies_root).policy
-            rows.append((card, _measured(card.env_id, policy, command.episodes, command.seed)))
+    for env_id in [command.env_id] if command.env_id else tasks or ["Hopper-v5"]:
+        found = shelf.find(env_id, level, root)
+        rows.append((found.card, _measured(env_id, found.policy, command.episodes, command.seed)))
     Console().print(_table(rows))
 
 
@@ -200,7 +214,7 @@ def _table(rows: list[tuple[Card, Measurement]]) -> Table:
     for card, m in rows:
         table.add_row(
             card.env_id if card.level == "expert" else f"{card.env_id} {card.level}",
-            f"{card.algorithm} {card.steps / 1e6:g}M",
+            f"{card.algorithm} {card.steps / 1e6:.3g}M",
             f"{m.return_mean:.1f} ± {m.return_std:.1f}",
             f"{m.return_min:.1f}",
             f"{m.length_mean:.0f} ({m.length_min})",

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -58,17 +59,21 @@ def judge_reward(reward: LearnedReward, probe: Probe, seed: int) -> dict[str, An
 
 
 def judge_drift(snapshots: Mapping[int, Path], probe: Probe) -> dict[str, Any]:
-    """How the reward moved from snapshot to snapshot, read on the same steps every time."""
+    """How the reward moved from snapshot to snapshot, read on the same steps every time.
+
+    `path` is the sum so far of the root mean squared changes: how far it walked, whatever the way.
+    """
     readings = []
     for path in snapshots.values():
         reward = load_reward(path)
         readings.append({name: read(reward, probe.steps[name]) for name in STRATA})
     at = list(snapshots)
-    changes = []
+    changes, path = [], 0.0
     for i in range(1, len(at)):
         moved = split(probe.stacked(readings[i - 1]), probe.stacked(readings[i]))
-        parts = {"offset": moved.offset, "scale": moved.scale, "shape": moved.shape, "total": moved.total}
-        changes.append({"from": at[i - 1], "to": at[i], **parts})
+        path += math.sqrt(moved.total)
+        shares = {name: finite(share) for name, share in moved.shares.items()}
+        changes.append({"from": at[i - 1], "to": at[i], **asdict(moved), "shares": shares, "path": path})
     return {
         "snapshots": at,
         "auroc": [finite(statistics.auroc(r["expert"], r["policy"])) for r in readings],

@@ -5,6 +5,7 @@ environments and random streams.
 """
 
 import signal
+import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -67,8 +68,14 @@ class Player:
         self._wall_s = 0.0
 
     def resume(self) -> None:
-        """Go on from the folder's last checkpoint; from the start when there is none."""
-        if (content := self.folder.load_checkpoint()) is not None:
+        """Go on from the folder's last checkpoint; from the start when there is none.
+
+        A damaged last checkpoint is left for the one before, and said.
+        """
+        content, damaged = self.folder.load_checkpoint()
+        for words in damaged:
+            print(f"irl: {words}; going on from the checkpoint before", file=sys.stderr)
+        if content is not None:
             self.algorithm.load_state_dict(content["algorithm"])
             self._recent.extend(content["recent"])
             self._wall_s = content["wall_s"]
@@ -87,7 +94,7 @@ class Player:
         due = self._snapshots(due)
         with (
             asked_to_stop() as asked,
-            curves(self.folder.path, self.watch.tensorboard) as draw,
+            curves(self.folder.path, start, self.watch.tensorboard) as draw,
             progress(self.folder.path.name, self.steps, start, self.watch.progress) as report,
         ):
             for round_ in self.algorithm.rounds(self.steps):

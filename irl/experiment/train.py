@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import torch
 from rich.console import Console
@@ -13,11 +12,11 @@ from irl.core.config import from_json, to_json
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
 from irl.core.types import from_episodes
-from irl.demos.load import Demos, check_task, load_demos
+from irl.demos.load import Demos
 from irl.discriminators.gail import GAIL
-from irl.envs.make import make
 from irl.experiment import build
 from irl.experiment.configs import GAILRun
+from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Interrupted, Player
 from irl.policies.policy import save_policy
 from irl.rewards.artefact import RewardSpec, save_reward
@@ -38,18 +37,13 @@ class Resume:
 def train_gail(config: GAILRun) -> None:
     """Train GAIL into a new run folder."""
     config = config.resolved()
-    env = make(config.env_id)
-    try:
-        demos = load_demos(
-            config.demos, episodes=config.demo_episodes, seed=config.seed, root=config.datasets_root
-        )
-        check_task(demos, env)
-    finally:
-        env.close()
+    if config.device == "cuda" and not torch.cuda.is_available():
+        raise UserError("--device cuda, but torch sees no GPU here; leave it out to train on the CPU")
+    demos = draw(config)
     torch.set_num_threads(config.threads)
     assert config.out is not None
     folder = records.create(config.out, to_json(config), environment(command_line(), config.device))
-    files.write_json(folder.path / "demonstrations.json", _drawn(demos))
+    files.write_json(folder.path / RECORD, drawn(demos))
     play(config, demos, folder)
 
 
@@ -65,11 +59,13 @@ def go_on(command: Resume) -> None:
         config = from_json(GAILRun, files.read_json(command.config), str(command.config))
         return train_gail(replace(config, out=command.out))
     assert command.resume is not None
+    if command.out is not None:
+        raise UserError(
+            "--resume goes on in its own folder; leave --out away, or repeat the run with --config"
+        )
     folder = records.open_run(command.resume)
     config = from_json(GAILRun, folder.config, str(folder.path / "config.json"))
-    demos = load_demos(
-        config.demos, episodes=config.demo_episodes, seed=config.seed, root=config.datasets_root
-    )
+    demos = drawn_again(config, folder)
     torch.set_num_threads(config.threads)
     return play(config, demos, folder)
 
@@ -101,7 +97,7 @@ def play(config: GAILRun, demos: Demos, folder: records.RunFolder) -> None:
 
 
 def _snapshot(config: GAILRun, demos: Demos, algorithm: Adversarial, path: Path) -> None:
-    """The policy, and the reward that its next round would be rewarded by."""
+    """The policy, and the reward that the round just done was rewarded by; untrained at step 0."""
     learner, discriminator = algorithm.learner, algorithm.discriminator
     assert isinstance(discriminator, GAIL)
     save_policy(learner.policy(), path / "policy.safetensors")
@@ -114,15 +110,6 @@ def _snapshot(config: GAILRun, demos: Demos, algorithm: Adversarial, path: Path)
         gamma=config.learner.gamma,
         reward_scale=learner.reward_scale,
         env_steps=learner.env_steps,
-        provenance=_drawn(demos) | {"seed": config.seed},
+        provenance=drawn(demos) | {"seed": config.seed},
     )
     save_reward(path / "reward", spec, discriminator.net)
-
-
-def _drawn(demos: Demos) -> dict[str, Any]:
-    return {
-        "dataset": demos.dataset_id,
-        "episodes": list(demos.indices),
-        "held_out": list(demos.held_out_indices),
-        "returns": [episode.return_ for episode in demos],
-    }

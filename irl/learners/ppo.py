@@ -23,6 +23,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
+from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
@@ -67,6 +68,8 @@ class PPOConfig:
     """Decay a round of the moving average of weights that is exported; 0 exports the newest."""
 
     def __post_init__(self) -> None:
+        check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "n_epochs")
+        check_at_least(self, 0, "lr", "clip_range")
         if self.steps_per_round % self.n_envs or self.steps_per_round % self.batch_size:
             raise ValueError(
                 f"steps_per_round ({self.steps_per_round}) must be a multiple of n_envs ({self.n_envs}) "

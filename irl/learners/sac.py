@@ -22,6 +22,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.sac.policies import Actor
 from torch import Tensor, nn
 
+from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
@@ -60,6 +61,8 @@ class SACConfig:
     """Decay a round of the moving average of weights that is exported; 0 exports the newest."""
 
     def __post_init__(self) -> None:
+        check_at_least(self, 1, "steps_per_round", "batch_size", "buffer_size")
+        check_at_least(self, 0, "learning_starts", "lr", "tau")
         for name in ("gamma", "average"):
             if not 0.0 <= (value := getattr(self, name)) < 1.0:
                 raise ValueError(f"{name} must be in [0, 1), not {value}")

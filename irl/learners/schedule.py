@@ -7,7 +7,10 @@ from typing import Literal
 def learning_rate(lr: float, schedule: Literal["constant", "linear"]) -> float | Callable[[float], float]:
     """What SB3 takes: a number, or a function of the share of the run that remains.
 
-    >>> learning_rate(0.5, "linear")(0.5)
-    0.25
+    The last round may go past the run's steps; SB3 then calls what remains negative.
+
+    >>> rate = learning_rate(0.5, "linear")
+    >>> rate(0.5), rate(-0.1)
+    (0.25, 0.0)
     """
-    return lr if schedule == "constant" else lambda remaining: lr * remaining
+    return lr if schedule == "constant" else lambda remaining: lr * max(remaining, 0.0)

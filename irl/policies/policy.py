@@ -1,4 +1,4 @@
-"""A trained policy that needs neither its learner nor torch to act.
+"""A trained policy as a few numpy arrays: acting needs no learner and no tensor.
 
     x = clip((obs - mean) / std, -10, 10);  m = mlp(x)
     gaussian:           action = clip(m, low, high)

@@ -17,7 +17,7 @@ from typing import Any
 
 import tyro
 
-from irl.core.provenance import environment
+from irl.core.provenance import command_line, environment
 
 ENV_ID = "Hopper-v5"
 RESULTS = Path(__file__).parent / "results" / "quickstart.json"
@@ -77,7 +77,7 @@ def main(settings: Settings) -> None:
             rows.append(one(seed, Path(folder)))
         shown = {name: value for name, value in rows[-1].items() if name != "curve"}
         print(json.dumps(shown), flush=True)
-        facts = environment("python scripts/benchmarks/quickstart.py --seeds 1 2 3")
+        facts = environment(f"python scripts/benchmarks/{command_line()}")
         settings.out.parent.mkdir(exist_ok=True)
         settings.out.write_text(json.dumps({"task": ENV_ID, **facts, "rows": rows}, indent=1) + "\n")
 

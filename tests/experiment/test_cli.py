@@ -32,7 +32,7 @@ MISTAKES = {
         ["7", "6"],
     ),
     "a used output folder": (f"train gail --env-id {TASK} --out used", ["used", "--out"]),
-    "no episodes": (f"demos generate --env-id {TASK} --episodes 0", ["--episodes", "0"]),
+    "no episodes": (f"demos generate --env-id {TASK} --episodes 0", ["episodes", "0"]),
     "no steps": (f"train gail --env-id {TASK} --steps 0 --out run", ["steps", "0"]),
     "settings that contradict": (
         f"train gail --env-id {TASK} --learner.n-envs 3 --out run",
