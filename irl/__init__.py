@@ -2,7 +2,7 @@
 
 >>> import irl
 >>> demos = irl.load_demos("irl/hopper/expert-v0", episodes=4, seed=0)    # doctest: +SKIP
->>> reward = irl.load_reward("runs/quickstart")                           # doctest: +SKIP
+>>> reward = irl.load_reward("runs/hopper")                           # doctest: +SKIP
 >>> reward(irl.from_episodes(demos.episodes)).mean()                      # doctest: +SKIP
 """
 

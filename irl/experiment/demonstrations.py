@@ -16,7 +16,7 @@ from irl.demos.root import datasets_root
 from irl.demos.storage import list_datasets
 from irl.envs.make import make
 from irl.envs.tasks import task_name
-from irl.experiment.progress import progress
+from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 from irl.policies.card import Card
 
@@ -71,7 +71,6 @@ def generate_demos(command: GenerateDemos) -> None:
     expert = shelf.find(command.env_id, command.level, command.policies_root)
     dataset_id = command.dataset_id or f"irl/{task_name(command.env_id)}/{command.level}-v0"
     with progress(dataset_id, command.episodes) as report:
-        done = iter(range(1, command.episodes + 1))
         info = generate(
             command.env_id,
             expert.policy,
@@ -83,7 +82,7 @@ def generate_demos(command: GenerateDemos) -> None:
             random_return=expert.card.random_return_mean,
             expert_return=_reference(command, expert.card),
             description=f"{command.level} of {command.env_id}, deterministic actions, seed {command.seed}",
-            on_episode=lambda episode: report(next(done), f"return {episode.return_:.0f}"),
+            on_episode=each_episode(report),
             overwrite=command.overwrite,
         )
     Console().print(_table(info))

@@ -21,7 +21,7 @@ from irl.envs.rollouts import rollouts
 from irl.experiment.configs import GAILRun
 from irl.experiment.draw import drawn_again
 from irl.experiment.judge import finite, judge_drift, judge_reward
-from irl.experiment.progress import progress
+from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 from irl.policies.card import Card, normalised_score, summary
 from irl.policies.policy import load_policy
@@ -96,13 +96,8 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
 def _play(env_id: str, snapshot: Path, command: Evaluate) -> list[Episode]:
     seeds = episode_seeds(command.seed, "evaluation", command.episodes)
     with progress("evaluating", command.episodes) as report:
-        done = iter(range(1, command.episodes + 1))
-        return rollouts(
-            env_id,
-            load_policy(snapshot / "policy.safetensors"),
-            seeds,
-            lambda episode: report(next(done), f"return {episode.return_:.0f}"),
-        )
+        policy = load_policy(snapshot / "policy.safetensors")
+        return rollouts(env_id, policy, seeds, each_episode(report))
 
 
 def _policy(episodes: Sequence[Episode], references: dict[str, Any]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import ExpertRun, Watch
 from irl.experiment.play import Interrupted, Player
-from irl.experiment.progress import progress
+from irl.experiment.progress import each_episode, progress
 from irl.experiment.recipes import recipe
 from irl.policies import shelf
 from irl.policies.card import Card, Measurement, measure, measure_random
@@ -180,9 +180,7 @@ def _shelve(run: ExpertRun, policy: Policy, steps: int, command: TrainExpert) ->
 
 def _measured(env_id: str, policy: Policy, n: int, seed: int) -> Measurement:
     with progress(f"measuring {env_id}", n) as report:
-        done = iter(range(1, n + 1))
-        seeds = episode_seeds(seed, "card", n)
-        return measure(env_id, policy, seeds, lambda e: report(next(done), f"return {e.return_:.0f}"))
+        return measure(env_id, policy, episode_seeds(seed, "card", n), each_episode(report))
 
 
 def evaluate(command: EvaluateExpert) -> None:

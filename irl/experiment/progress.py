@@ -1,5 +1,6 @@
 """What a person sees while it trains: a bar on a terminal, a line now and then elsewhere."""
 
+import itertools
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -8,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from irl.core.metrics import Row
+from irl.core.types import Episode
 
 Report = Callable[[int, str], None]
 """Called with how far it is and a few words."""
@@ -28,6 +30,12 @@ def progress(what: str, total: int, start: int = 0, show: bool = True) -> Iterat
             yield lambda done, words: bar.update(task, completed=done, words=words)
     else:
         yield _lines(console, what, total, start)
+
+
+def each_episode(report: Report) -> Callable[[Episode], None]:
+    """What a rollout calls with each finished episode, so that `report` shows it with its return."""
+    done = itertools.count(1)
+    return lambda episode: report(next(done), f"return {episode.return_:.0f}")
 
 
 def training_words(row: Row, steps_per_s: float) -> str:

@@ -3,7 +3,6 @@
 Every string that comes from a file is escaped, and the page forbids itself to load anything.
 """
 
-import os
 from collections.abc import Iterable, Mapping
 from html import escape
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
+from irl.core import files
 from irl.report.folder import RunFiles, lookup, number, read_run, texts
 from irl.report.header import header, settings
 from irl.report.palette import STRATA, STRATUM_NAMES
@@ -30,11 +30,8 @@ def write_report(run: Path) -> Path:
     Raises:
         UserError: there is no such folder.
     """
-    page = render(read_run(run))
     target = run / "report.html"
-    aside = run / f".report.html.{os.getpid()}"
-    aside.write_text(page, encoding="utf-8")
-    aside.replace(target)
+    files.write_bytes(target, render(read_run(run)).encode())
     return target
 
 

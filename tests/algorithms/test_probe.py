@@ -37,6 +37,10 @@ def test_random_episodes_are_whole_and_enough() -> None:
     assert all(episode.terminated or episode.truncated for episode in episodes)
 
 
+def test_a_small_probe_still_has_its_random_episodes() -> None:
+    assert len(random_episodes("PointMass-v0", 3, seed=0)) == 20
+
+
 def test_reading_follows_the_episodes() -> None:
     episodes = pointmass.demonstrations(2)
     per_episode = read_episodes(total, episodes)

@@ -25,7 +25,7 @@ def test_a_new_run_says_what_it_will_do(run: RunFolder) -> None:
     assert run.config == {"kind": "gail", "seed": 0}
     assert json.loads((run.path / "environment.json").read_text()) == {"python": "3"}
     assert open_run(run.path).config == run.config
-    assert (run.metrics(), run.snapshots(), run.load_checkpoint()) == ([], {}, None)
+    assert (run.metrics(), run.snapshots(), run.load_checkpoint()) == ([], {}, (None, []))
 
 
 def test_a_used_folder_is_refused_and_left_alone(run: RunFolder, tmp_path: Path) -> None:
@@ -129,8 +129,9 @@ def test_what_a_killed_process_left_aside_is_no_snapshot(run: RunFolder) -> None
 def test_the_newest_checkpoints_are_kept_and_the_last_one_is_loaded(run: RunFolder) -> None:
     for steps in (900, 1_000, 20_000):
         run.save_checkpoint(steps, {"steps": steps, "weights": torch.full((2,), float(steps))})
-        loaded = run.load_checkpoint()
+        loaded, damaged = run.load_checkpoint()
         assert loaded is not None
+        assert damaged == []
         assert loaded["steps"] == steps
         assert loaded["weights"].tolist() == [steps, steps]
     assert KEPT_CHECKPOINTS == 2
@@ -141,8 +142,21 @@ def test_a_checkpoint_that_fails_leaves_the_older_one(run: RunFolder) -> None:
     run.save_checkpoint(1, {"steps": 1})
     with pytest.raises(TypeError):
         run.save_checkpoint(2, {"steps": object()})
-    assert run.load_checkpoint() == {"steps": 1}
+    assert run.load_checkpoint() == ({"steps": 1}, [])
     assert names(run.path / "checkpoint") == ["000000001"]
+
+
+@pytest.mark.parametrize("name", ["state.json", "state.safetensors"])
+def test_a_torn_last_checkpoint_falls_back_to_the_one_before(run: RunFolder, name: str) -> None:
+    for steps in (1, 2):
+        run.save_checkpoint(steps, {"steps": torch.full((100,), steps)})
+    torn = run.path / "checkpoint" / "000000002" / name
+    torn.write_bytes(torn.read_bytes()[:40])
+    loaded, damaged = run.load_checkpoint()
+    assert loaded is not None
+    assert loaded["steps"][0] == 1
+    assert len(damaged) == 1
+    assert "000000002" in damaged[0]
 
 
 def test_a_damaged_checkpoint_is_the_users_to_mend(run: RunFolder) -> None:
@@ -163,5 +177,5 @@ def test_snapshots_are_due_at_the_ends_the_quarters_and_the_halvings(total: int,
 
 
 def test_snapshot_steps_of_the_quickstart() -> None:
-    expected = [0, 1_920, 3_840, 7_680, 15_360, 30_720, 61_440, 92_160, 122_880]
-    assert snapshot_steps(122_880) == expected
+    expected = [0, 3_840, 7_680, 15_360, 30_720, 61_440, 122_880, 184_320, 245_760]
+    assert snapshot_steps(245_760) == expected

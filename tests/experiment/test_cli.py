@@ -33,6 +33,16 @@ MISTAKES = {
     ),
     "a used output folder": (f"train gail --env-id {TASK} --out used", ["used", "--out"]),
     "no episodes": (f"demos generate --env-id {TASK} --episodes 0", ["episodes", "0"]),
+    "no passes": (f"train gail --env-id {TASK} --schedule.epochs 0 --out run", ["epochs", "0"]),
+    "no environments": (f"train gail --env-id {TASK} --learner.n-envs 0 --out run", ["n_envs", "0"]),
+    "a negative seed": (f"train gail --env-id {TASK} --seed -1 --out run", ["seed", "-1"]),
+    "a seed too large": (f"train gail --env-id {TASK} --seed 4294967296 --out run", ["seed", "4294967295"]),
+    "an expert for no steps": (f"experts train --env-id {TASK} --steps 0", ["steps", "0"]),
+    "an expert measured never": (f"experts evaluate --env-id {TASK} --episodes 0", ["episodes", "0"]),
+    "a level that is not there": (
+        f"experts evaluate --env-id {TASK} --level medium",
+        ["medium", "irl experts train"],
+    ),
     "no steps": (f"train gail --env-id {TASK} --steps 0 --out run", ["steps", "0"]),
     "settings that contradict": (
         f"train gail --env-id {TASK} --learner.n-envs 3 --out run",

@@ -11,7 +11,7 @@ from irl.core.records import open_run
 from irl.core.rng import episode_seeds
 from irl.envs.rollouts import rollouts
 from irl.policies.policy import load_policy
-from tests.experiment.conftest import QUICK, TASK
+from tests.experiment.conftest import DATASET, QUICK, TASK
 
 Command = Callable[..., None]
 
@@ -41,6 +41,9 @@ def test_numbers_of_a_run(train: Callable[..., Path], irl: Command, capsys: pyte
     for change in drift["changes"]:
         parts = change["offset"] + change["scale"] + change["shape"]
         assert parts == pytest.approx(change["total"], rel=1e-9)
+    walked = [change["path"] for change in drift["changes"]]
+    assert walked == sorted(walked)
+    assert walked[-1] == pytest.approx(sum(change["total"] ** 0.5 for change in drift["changes"]))
     assert "report.html" in capsys.readouterr().out
     assert "https://" not in (run / "report.html").read_text().split("<script>")[0]
 
@@ -63,6 +66,17 @@ def test_without_a_hand_written_reward_the_rest_is_still_said(irl: Command) -> N
     assert "constant" in found["reward"]["pearson_reason"]
     assert 0 <= found["reward"]["auroc"] <= 1
     assert found["drift"]["changes"]
+
+
+def test_a_task_that_pays_nan_is_evaluated_too(irl: Command) -> None:
+    irl("train", "gail", "--env-id", "NaNReward-v0", "--demos", DATASET, "--out", "run", *QUICK)
+    irl("evaluate", "run", "--episodes", "3")
+    found = files.read_json(Path("run/evaluation.json"))
+    assert found["policy"]["return_mean"] is None
+    assert found["policy"]["normalised_score"] is None
+    assert "not a finite number" in found["policy"]["normalised_score_reason"]
+    assert found["reward"]["pearson"] is None
+    assert 0 <= found["reward"]["auroc"] <= 1
 
 
 def test_with_no_episode_held_out_it_says_so(train: Callable[..., Path], irl: Command) -> None:

@@ -12,7 +12,7 @@ from irl.core.records import open_run
 from irl.experiment import play
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
-from tests.experiment.conftest import TASK
+from tests.experiment.conftest import DATASET, QUICK, TASK
 
 Train = Callable[..., Path]
 Command = Callable[..., None]
@@ -63,6 +63,38 @@ def test_watching_changes_no_weight(train: Train) -> None:
     watched = train("watched", "--watch.checkpoint-every-s", "0")
     quiet = train("quiet", "--watch.eval-episodes", "0", "--watch.no-tensorboard")
     assert equal(final_weights(watched), final_weights(quiet))
+
+
+def test_the_tasks_own_reward_replaced_by_nan_changes_no_weight_of_policy_or_discriminator(
+    irl: Command,
+) -> None:
+    for env_id in (TASK, "NaNReward-v0"):
+        irl("train", "gail", "--env-id", env_id, "--demos", DATASET, "--out", env_id, *QUICK)
+    assert equal(final_weights(Path(TASK)), final_weights(Path("NaNReward-v0")))
+
+
+def test_the_demonstrations_a_run_was_begun_with_are_the_ones_it_goes_on_with(
+    train: Train, irl: Command, capfd: pytest.CaptureFixture
+) -> None:
+    train("run")
+    irl("demos", "generate", "--env-id", TASK, "--episodes", "6", "--seed", "9", "--datasets-root", "others")
+    for words in (("evaluate", "run", "--datasets-root", "others"),):
+        with pytest.raises(SystemExit):
+            irl(*words)
+        assert "begun with" in capfd.readouterr().err.splitlines()[-1]
+
+
+def test_a_torn_last_checkpoint_is_said_and_the_run_ends_the_same(
+    train: Train, irl: Command, capfd: pytest.CaptureFixture
+) -> None:
+    run = train("run", "--watch.checkpoint-every-s", "0")
+    before = final_weights(run), timeless(run)
+    last = sorted((run / "checkpoint").iterdir())[-1] / "state.safetensors"
+    last.write_bytes(last.read_bytes()[:100])
+    irl("train", "--resume", run)
+    assert "damaged" in capfd.readouterr().err
+    assert equal(before[0], final_weights(run))
+    assert before[1] == timeless(run)
 
 
 def test_config_json_repeats_the_run(train: Train, irl: Command) -> None:

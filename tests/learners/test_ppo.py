@@ -14,7 +14,16 @@ from irl.core.types import Transitions, from_episodes
 from irl.learners.ppo import PPOConfig, PPOLearner
 from tests import pointmass
 
-SMALL = PPOConfig(n_envs=2, steps_per_round=128, batch_size=64, n_epochs=2, hidden=(16,), gamma=0.9)
+SMALL = PPOConfig(
+    n_envs=2,
+    steps_per_round=128,
+    batch_size=64,
+    n_epochs=2,
+    lr=3e-4,
+    lr_schedule="constant",
+    hidden=(16,),
+    gamma=0.9,
+)
 
 
 def ones(batch: Transitions) -> Tensor:
@@ -124,6 +133,15 @@ def test_the_exported_policy_is_a_copy_and_acts_as_the_library_predicts() -> Non
     ours.collect()
     ours.improve(position)
     np.testing.assert_array_equal(np.array([exported(row) for row in obs]), acted)
+
+
+def test_a_last_round_past_the_end_learns_at_rate_zero() -> None:
+    ours = learner(config=replace(SMALL, lr_schedule="linear"), total_steps=100)
+    before = weights(ours)
+    ours.collect()
+    ours.improve(position)
+    assert ours.env_steps == 128
+    assert all(torch.equal(before[name], after) for name, after in weights(ours).items())
 
 
 def test_improving_twice_on_one_rollout_is_refused() -> None:
