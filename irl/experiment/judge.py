@@ -22,7 +22,10 @@ SCATTER = 3000
 
 
 def judge_reward(reward: LearnedReward, probe: Probe, seed: int) -> dict[str, Any]:
-    """Agreement with the hand-written reward, separation of expert and policy, means by stratum."""
+    """Agreement with the hand-written reward, separation of expert and policy, means by stratum.
+
+    Over all strata a correlation is mostly their order, which is easy; within one it is the reward's detail.
+    """
     hand_written = HandWritten()
     learned = {name: read(reward, probe.steps[name]) for name in STRATA}
     truth = {name: read(hand_written, probe.steps[name]) for name in STRATA}
@@ -50,6 +53,7 @@ def judge_reward(reward: LearnedReward, probe: Probe, seed: int) -> dict[str, An
                 "std": float(learned[name].std()),
                 "steps": len(learned[name]),
                 "hand_written_mean": finite(float(truth[name].mean())),
+                "pearson": finite(per_step(learned[name], truth[name]).pearson),
             }
             for name in STRATA
         },

@@ -75,14 +75,17 @@ def _strata(run: RunFiles) -> str:
     for name in STRATA:
         mean, std = number(strata, f"{name}.mean"), number(strata, f"{name}.std")
         steps, hand_written = number(strata, f"{name}.steps"), number(strata, f"{name}.hand_written_mean")
+        within = number(strata, f"{name}.pearson")
         cells = (
             MISSING if mean is None else spread(mean, std),
             MISSING if hand_written is None else amount(hand_written),
+            MISSING if within is None else f"{within:.2f}",
             MISSING if steps is None else f"{steps:,.0f}",
         )
         dot = f'<span class="dot" style="background:{STRATA[name]}"></span>'
         rows.append(f'<tr><th scope="row">{dot}{STRATUM_NAMES[name]}</th>{_cells(cells)}</tr>')
-    head = "<tr><th>Mean reward of a step</th><th>learned</th><th>hand-written</th><th>steps</th></tr>"
+    columns = ("Mean reward of a step", "learned", "hand-written", "Pearson within", "steps")
+    head = f"<tr>{''.join(f'<th>{column}</th>' for column in columns)}</tr>"
     return f'<table class="strata"><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table>'
 
 

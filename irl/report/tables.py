@@ -47,7 +47,7 @@ def _numbers(evaluation: Mapping[str, Any]) -> Table:
 def _strata(evaluation: Mapping[str, Any]) -> Table:
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("mean reward of a step")
-    for name in ("learned", "hand-written", "steps"):
+    for name in ("learned", "hand-written", "r within", "steps"):
         table.add_column(name, justify="right")
     for name in STRATA:
         path = f"reward.strata.{name}"
@@ -55,11 +55,12 @@ def _strata(evaluation: Mapping[str, Any]) -> Table:
             number(evaluation, f"{path}.mean"),
             number(evaluation, f"{path}.hand_written_mean"),
         )
-        steps = number(evaluation, f"{path}.steps")
+        steps, within = number(evaluation, f"{path}.steps"), number(evaluation, f"{path}.pearson")
         table.add_row(
             STRATUM_NAMES[name],
             MISSING if mean is None else spread(mean, number(evaluation, f"{path}.std")),
             MISSING if hand_written is None else amount(hand_written),
+            MISSING if within is None else f"{within:.2f}",
             MISSING if steps is None else f"{steps:,.0f}",
         )
     return table

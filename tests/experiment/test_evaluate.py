@@ -36,6 +36,7 @@ def test_numbers_of_a_run(train: Callable[..., Path], irl: Command, capsys: pyte
     assert 0 <= reward["auroc"] <= 1
     assert set(reward["strata"]) == {"expert", "policy", "random"}
     assert len({stratum["steps"] for stratum in reward["strata"].values()}) == 1
+    assert all(-1 <= stratum["pearson"] <= 1 for stratum in reward["strata"].values())
     drift = found["drift"]
     assert drift["snapshots"] == list(open_run(run).snapshots())
     for change in drift["changes"]:
