@@ -161,7 +161,6 @@ def test_the_comparison_with_a_card_sees_a_moved_weight(nowhere: Path) -> None:
     assert not repeats_its_card(perturbed(found.policy), found.card)
 
 
-@pytest.mark.skipif(not (SHIPPED / "hopper" / "expert").is_dir(), reason="no hopper expert shipped yet")
 def test_the_expert_of_hopper_is_shipped_and_good() -> None:
     card = shelf.find("Hopper-v5").card
     assert card.measured.return_mean >= 3200

@@ -1,0 +1,111 @@
+"""Kill runs with SIGKILL at random moments, resume them, and compare with a run that nobody killed.
+
+    python scripts/kill_and_resume.py --kills 20
+
+Two runs on Hopper-v5: GAIL with PPO, and a SAC expert. Each is killed at `kills` moments drawn over its
+length, resumed after each, and must end with the same weights and the same metrics (but for wall clock).
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from irl.core.rng import stream
+
+PROGRAM = (sys.executable, "-c", "from irl.experiment.cli import main; main()")
+WATCH = (
+    "--watch.no-progress",
+    "--watch.no-tensorboard",
+    "--watch.checkpoint-every-s=0",
+    "--watch.eval-every=3",
+)
+GAIL = (
+    "train",
+    "gail",
+    "--env-id",
+    "Hopper-v5",
+    "--steps",
+    "20480",
+    "--learner.steps-per-round",
+    "512",
+    *WATCH,
+)
+SAC = ("experts", "train", "--env-id", "Hopper-v5", "--algo", "sac", "--steps", "8000", *WATCH)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How often to kill."""
+
+    kills: int = 20
+    """Kills of each of the two runs."""
+    seed: int = 0
+    """Draws the moments."""
+
+
+def run(words: tuple[str, ...], folder: Path, kill_after_s: float | None = None) -> bool:
+    """Run one command to its end, or kill it; whether it came to its end."""
+    env = os.environ | {"MINARI_DATASETS_PATH": str(folder / "datasets"), "OMP_NUM_THREADS": "1"}
+    log = (folder / "log.txt").open("a")
+    process = subprocess.Popen([*PROGRAM, *words], cwd=folder, env=env, stdout=log, stderr=log)
+    try:
+        if process.wait(timeout=kill_after_s) != 0:
+            raise RuntimeError(f"{' '.join(words)} failed:\n{(folder / 'log.txt').read_text()[-2000:]}")
+        return True
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        return False
+
+
+def ends(run_folder: Path) -> tuple[dict[str, bytes], list[dict]]:
+    """Every file of the last snapshot, and the metrics without wall clock."""
+    last = sorted((run_folder / "snapshots").iterdir())[-1]
+    weights = {p.relative_to(last).as_posix(): p.read_bytes() for p in sorted(last.rglob("*.safetensors"))}
+    rows = [json.loads(line) for line in (run_folder / "metrics.jsonl").read_text().splitlines()]
+    return weights, [{k: v for k, v in row.items() if k != "wall_s"} for row in rows]
+
+
+def compare(name: str, start: tuple[str, ...], resume: tuple[str, ...], folder: Path, s: Settings) -> bool:
+    """One run straight through and one killed again and again; whether they end the same."""
+    began = time.monotonic()
+    run((*start, "--out", "straight"), folder)
+    whole_s = time.monotonic() - began
+    # the start-up is short of nothing to lose; the moments are spread over all of it and one round more
+    moments = stream(s.seed, f"kills of {name}").uniform(0.0, whole_s / 3, s.kills)
+    kills, begun = 0, False
+    for moment in moments:
+        words = (*resume, "killed") if begun else (*start, "--out", "killed")
+        if run(words, folder, float(moment)):
+            break
+        kills += 1
+        begun = (folder / "killed" / "config.json").is_file()
+    else:
+        run((*resume, "killed") if begun else (*start, "--out", "killed"), folder)
+    same = ends(folder / "straight") == ends(folder / "killed")
+    print(f"{name}: killed {kills} times, ends {'the same' if same else 'DIFFERENT'}", flush=True)
+    return same
+
+
+def main(settings: Settings) -> None:
+    """Both runs; exit status 1 when one ends differently."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        run(("demos", "generate", "--env-id", "Hopper-v5", "--episodes", "5"), folder)
+        gail = compare("gail", GAIL, ("train", "--resume"), folder, settings)
+    with tempfile.TemporaryDirectory() as temporary:
+        words = (*SAC, "--policies-root", "shelf")
+        sac = compare("sac", words, (*words, "--out"), Path(temporary), settings)
+    raise SystemExit(0 if gail and sac else 1)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings))
