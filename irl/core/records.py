@@ -93,19 +93,28 @@ class RunFolder:
         return None, damaged
 
 
-def create(path: Path, config: Mapping[str, Any], environment: Mapping[str, Any]) -> RunFolder:
-    """A new run folder that says what it will do.
+def create(
+    path: Path,
+    config: Mapping[str, Any],
+    environment: Mapping[str, Any],
+    more: Mapping[str, Any] | None = None,
+) -> RunFolder:
+    """A new run folder that says what it will do; it appears with all of that or not at all.
+
+    Args:
+        more: other documents to begin with, by file name.
 
     Raises:
         UserError: the folder holds something already.
     """
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         what = "a run" if (path / "config.json").is_file() else "other files"
-        more = f", or go on with it: irl train --resume {path}" if what == "a run" else ""
-        raise UserError(f"{path} already holds {what}; choose another folder with --out{more}")
-    path.mkdir(parents=True, exist_ok=True)
-    files.write_json(path / "environment.json", environment)
-    files.write_json(path / "config.json", config)
+        hint = f", or go on with it: irl train --resume {path}" if what == "a run" else ""
+        raise UserError(f"{path} already holds {what}; choose another folder with --out{hint}")
+    documents = {"config.json": config, "environment.json": environment, **(more or {})}
+    with files.new_folder(path) as folder:
+        for name, content in documents.items():
+            files.write_json(folder / name, content)
     return RunFolder(path)
 
 

@@ -42,8 +42,8 @@ def train_gail(config: GAILRun) -> None:
     demos = draw(config)
     torch.set_num_threads(config.threads)
     assert config.out is not None
-    folder = records.create(config.out, to_json(config), environment(command_line(), config.device))
-    files.write_json(folder.path / RECORD, drawn(demos))
+    made_by = environment(command_line(), config.device)
+    folder = records.create(config.out, to_json(config), made_by, {RECORD: drawn(demos)})
     play(config, demos, folder)
 
 
