@@ -36,11 +36,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     words = [word for word in words if word != "--debug"]
     try:
         _dispatch(words)
-    except UserError as error:
-        if debug:
-            raise
-        _fail(str(error))
-    except OSError as error:
+    except (UserError, OSError) as error:
         if debug:
             raise
         _fail(str(error))

@@ -1,7 +1,6 @@
 """`irl experts`: train a policy on a task's own reward, measure it, put it on the shelf."""
 
 import dataclasses
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -20,7 +19,7 @@ from irl.envs.make import make
 from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import ExpertRun, Watch
-from irl.experiment.play import Interrupted, Player
+from irl.experiment.play import Player
 from irl.experiment.progress import each_episode, progress
 from irl.experiment.recipes import recipe
 from irl.policies import shelf
@@ -109,14 +108,7 @@ def train(command: TrainExpert) -> None:
         seed=run.seed,
         snapshot=lambda path: save_policy(algorithm.learner.policy(), path / shelf.POLICY),
     )
-    player.resume()
-    try:
-        player.play()
-    except Interrupted:
-        print("stopped; the same command goes on", file=sys.stderr)
-        raise
-    finally:
-        algorithm.learner.close()
+    player.run(to_go_on=command_line())
     steps, last = list(folder.snapshots().items())[-1]
     _shelve(run, load_policy(last / shelf.POLICY), steps, command)
 

@@ -67,6 +67,21 @@ class Player:
         self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
         self._wall_s = 0.0
 
+    def run(self, to_go_on: str) -> None:
+        """Go on from the last checkpoint, play to the end, and close the environments.
+
+        Raises:
+            Interrupted: the user asked to stop; `to_go_on`, the command that goes on, was printed.
+        """
+        self.resume()
+        try:
+            self.play()
+        except Interrupted:
+            print(f"stopped; go on with: {to_go_on}", file=sys.stderr)
+            raise
+        finally:
+            self.algorithm.learner.close()
+
     def resume(self) -> None:
         """Go on from the folder's last checkpoint; from the start when there is none.
 

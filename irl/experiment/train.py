@@ -1,10 +1,10 @@
 """`irl train`: learn a policy and a reward from demonstrations."""
 
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
-from rich.console import Console
 
 from irl.algorithms.adversarial import Adversarial
 from irl.core import files, records
@@ -17,7 +17,7 @@ from irl.discriminators.gail import GAIL
 from irl.experiment import build
 from irl.experiment.configs import GAILRun
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
-from irl.experiment.play import Interrupted, Player
+from irl.experiment.play import Player
 from irl.policies.policy import save_policy
 from irl.rewards.artefact import RewardSpec, save_reward
 
@@ -82,18 +82,8 @@ def play(config: GAILRun, demos: Demos, folder: records.RunFolder) -> None:
         seed=config.seed,
         snapshot=lambda path: _snapshot(config, demos, algorithm, path),
     )
-    player.resume()
-    console = Console(stderr=True)
-    try:
-        player.play()
-    except Interrupted:
-        console.print(
-            f"stopped; go on with: irl train --resume {folder.path}", highlight=False, soft_wrap=True
-        )
-        raise
-    finally:
-        algorithm.learner.close()
-    console.print(f"trained; judge it with: irl evaluate {folder.path}", highlight=False, soft_wrap=True)
+    player.run(to_go_on=f"irl train --resume {folder.path}")
+    print(f"trained; judge it with: irl evaluate {folder.path}", file=sys.stderr)
 
 
 def _snapshot(config: GAILRun, demos: Demos, algorithm: Adversarial, path: Path) -> None:

@@ -148,7 +148,7 @@ def test_a_folder_of_datasets_is_not_overwritten(make_hopper, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "dataset_id", ["irl/hopper", "", "../hopper-v0", "/tmp/hopper-v0", "a b-v0", "irl//hopper-v0"]
+    "dataset_id", ["irl/hopper", "", "../hopper-v0", "/hopper-v0", "a b-v0", "irl//hopper-v0"]
 )
 def test_ids_that_minari_does_not_take(make_hopper, tmp_path, dataset_id):
     with pytest.raises(UserError, match="is not a dataset id"):

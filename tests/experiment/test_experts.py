@@ -11,22 +11,9 @@ from irl.experiment import recipes
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 from irl.policies import shelf
+from tests.policies.test_card import FIXED
 
 Command = Callable[..., None]
-FIXED_NAMES = {
-    "env_id",
-    "algorithm",
-    "steps",
-    "seed",
-    "return_mean",
-    "return_std",
-    "return_min",
-    "return_max",
-    "length_min",
-    "episodes",
-    "random_return_mean",
-    "weights_sha256",
-}
 
 
 @pytest.fixture(autouse=True)
@@ -43,7 +30,7 @@ def test_an_expert_is_trained_measured_and_shelved(irl: Command, algo: str) -> N
     words = ("--env-id", "Cliff-v0", "--algo", algo, "--policies-root", "shelf", "--watch.no-progress")
     irl("experts", "train", *words)
     card = files.read_json(Path("shelf/cliff/expert/card.json"))
-    assert set(card) >= FIXED_NAMES
+    assert set(card) >= FIXED
     assert (card["env_id"], card["algorithm"], card["episodes"]) == ("Cliff-v0", algo, 20)
     assert len(card["episode_seeds"]) == len(set(card["episode_seeds"])) == 20
     found = shelf.find("Cliff-v0", root=Path("shelf"))
