@@ -25,6 +25,7 @@ DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_500_000, _PPO), "sac": Recipe(1_0
 
 RECIPES: dict[tuple[str, str], Recipe] = {
     ("Hopper-v5", "ppo"): Recipe(1_500_000, _PPO),
+    ("Walker2d-v5", "ppo"): Recipe(6_000_000, _PPO),
 }
 """By task and algorithm; a row here made a shipped expert."""
 
