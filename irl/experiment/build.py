@@ -47,6 +47,6 @@ def forward(config: ExpertRun) -> Forward:
             seeds = episode_seeds(config.seed, "training", settings.n_envs)
             learner = PPOLearner(config.env_id, seeds, settings, **run)
         case SACConfig() as settings:
-            seeds = episode_seeds(config.seed, "training", 1)
+            seeds = episode_seeds(config.seed, "training", settings.n_envs)
             learner = SACLearner(config.env_id, seeds, settings, **run)
     return Forward(learner, HandWritten())

@@ -1,72 +1,112 @@
-"""SB3's replay buffer with the reward decided when a batch is drawn, never when it is stored."""
+"""What off-policy learning remembers: transitions, each observation once, no reward of the learner's.
+
+Row t N + i is step t of environment i, so the next observation of a row is the observation N rows
+further on. Only where an episode ended is it somewhere else, in a side table. The oldest N rows of a
+full memory are those whose observation the newest step has just overwritten; they are not drawn.
+"""
 
 from typing import Any
 
 import numpy as np
 import torch
-from gymnasium.spaces import Box
-from stable_baselines3.common.buffers import ReplayBuffer
-from stable_baselines3.common.type_aliases import ReplayBufferSamples
-from stable_baselines3.common.vec_env import VecNormalize
+from jaxtyping import Bool, Float
+from torch import Tensor
 
-from irl.core.types import RewardFn, Transitions
-
-COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+from irl.core.types import Transitions
 
 
-class RewardedReplay(ReplayBuffer):
-    """Transitions whose reward is `self.reward` of the batch at the moment it is sampled.
+class Replay:
+    """The last `capacity` transitions of N environments, float32, on the CPU or a device."""
 
-    What is stored as reward is the environment's own, for a `RewardFn` that asks for it. Float32
-    throughout: MuJoCo's float64 observations would double the memory.
-    """
+    def __init__(
+        self, capacity: int, n_envs: int, obs_size: int, action_size: int, device: str = "cpu"
+    ) -> None:
+        self.n_envs, self.device = n_envs, device
+        self._rows = (-(-capacity // n_envs) + 1) * n_envs
+        make = {"dtype": torch.float32, "device": device}
+        self._obs = torch.zeros(self._rows, obs_size, **make)
+        self._action = torch.zeros(self._rows, action_size, **make)
+        self._own = torch.zeros(self._rows, **make)
+        self._terminated = torch.zeros(self._rows, dtype=torch.bool, device=device)
+        self._truncated = torch.zeros(self._rows, dtype=torch.bool, device=device)
+        self._end_of = torch.full((self._rows,), -1, dtype=torch.int32, device=device)
+        self._ends = torch.zeros(16, obs_size, **make)
+        self._free = list(range(16))
+        self.added = 0
+        """Transitions added since the start."""
 
-    def __init__(self, buffer_size: int, observation_space: Box, action_space: Box, **more: Any) -> None:
-        low, high = (bound.astype(np.float32) for bound in (observation_space.low, observation_space.high))
-        narrow = Box(low, high, dtype=np.float32)
-        super().__init__(buffer_size, narrow, action_space, **more)
-        self.reward: RewardFn | None = None
-        low, high = action_space.low, action_space.high
-        self._center = torch.as_tensor((high + low) / 2, device=self.device)
-        self._half = torch.as_tensor((high - low) / 2, device=self.device)
+    def __len__(self) -> int:
+        return min(self.added, self._rows - self.n_envs)
 
     def add(
         self,
-        obs: np.ndarray,
-        next_obs: np.ndarray,
-        action: np.ndarray,
-        reward: np.ndarray,
-        done: np.ndarray,
-        infos: list[dict[str, Any]],
+        obs: Float[np.ndarray, "N O"],
+        action: Float[np.ndarray, "N A"],
+        next_obs: Float[np.ndarray, "N O"],
+        terminated: Bool[np.ndarray, "N"],
+        truncated: Bool[np.ndarray, "N"],
+        own: Float[np.ndarray, "N"],
     ) -> None:
-        """Store one step of every environment; the reward handed on by the environments is zeros."""
-        own = np.array([info["own_reward"] for info in infos])
-        super().add(obs, next_obs, action, own, done, infos)
+        """Remember one step of every environment; `own` is the environments' own reward."""
+        here = self.added % self._rows
+        now, after = slice(here, here + self.n_envs), (here + self.n_envs) % self._rows
+        self._forget_ends(here)
+        self._obs[now], self._action[now] = torch.from_numpy(obs), torch.from_numpy(action)
+        self._own[now] = torch.from_numpy(own)
+        self._terminated[now] = torch.from_numpy(terminated)
+        self._truncated[now] = torch.from_numpy(truncated)
+        self._obs[after : after + self.n_envs] = torch.from_numpy(next_obs)
+        for i in np.flatnonzero(terminated | truncated).tolist():
+            self._end_of[here + i] = slot = self._new_slot()
+            self._ends[slot] = torch.from_numpy(next_obs[i])
+        self.added += self.n_envs
 
-    def _get_samples(self, batch_inds: np.ndarray, env: VecNormalize | None = None) -> ReplayBufferSamples:
-        envs = np.random.randint(0, self.n_envs, size=len(batch_inds))
-        obs, next_obs, action, own, done, timeout = (
-            self.to_torch(getattr(self, name)[batch_inds, envs]) for name in COLUMNS
+    def sample(self, size: int, rng: torch.Generator) -> Transitions:
+        """`size` transitions drawn with replacement from `rng`."""
+        drawn = torch.randint(len(self), (size,), generator=rng, device=self.device)
+        return self.rows((drawn + (self.added - len(self))) % self._rows)
+
+    def rows(self, rows: Tensor) -> Transitions:
+        """The transitions stored in these rows."""
+        next_obs = self._obs[(rows + self.n_envs) % self._rows]
+        slots = self._end_of[rows]
+        ended = slots >= 0
+        if ended.any():
+            next_obs[ended] = self._ends[slots[ended].long()]
+        return Transitions(
+            self._obs[rows],
+            self._action[rows],
+            next_obs,
+            self._terminated[rows],
+            self._truncated[rows],
+            self._own[rows],
         )
-        assert self.reward is not None, "give the buffer a reward before sampling from it"
-        truncated = timeout.bool()
-        terminated = done.bool() & ~truncated
-        # the buffer holds SAC's actions in [-1, 1]; rewards judge what the environment saw
-        batch = Transitions(
-            obs, action * self._half + self._center, next_obs, terminated, truncated, own.double()
-        )
-        with torch.no_grad():
-            reward = self.reward(batch).float()
-        return ReplayBufferSamples(obs, action, next_obs, terminated.float()[:, None], reward[:, None])
+
+    def _forget_ends(self, here: int) -> None:
+        if self.added >= self._rows:
+            old = self._end_of[here : here + self.n_envs]
+            self._free += old[old >= 0].tolist()
+            old.fill_(-1)
+
+    def _new_slot(self) -> int:
+        if not self._free:
+            size = len(self._ends)
+            self._ends = torch.cat([self._ends, torch.zeros_like(self._ends)])
+            self._free = list(range(size, 2 * size))
+        return self._free.pop()
 
     def state_dict(self) -> dict[str, Any]:
-        """Everything stored so far. Cost: the whole buffer."""
-        stored = self.buffer_size if self.full else self.pos
-        columns = {name: getattr(self, name)[:stored] for name in COLUMNS}
-        return {"columns": columns, "pos": self.pos, "full": self.full}
+        """Everything remembered so far. Cost: the whole memory."""
+        used = min(self.added + self.n_envs, self._rows)
+        columns = {name: getattr(self, name)[:used] for name in _COLUMNS}
+        return {"columns": columns, "ends": self._ends, "free": list(self._free), "added": self.added}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go on where another buffer of the same size was."""
+        """Go on where another memory of the same size was."""
         for name, values in state["columns"].items():
-            getattr(self, name)[: len(values)] = values
-        self.pos, self.full = state["pos"], state["full"]
+            getattr(self, name)[: len(values)] = values.to(self.device)
+        self._ends = state["ends"].to(self.device)
+        self._free, self.added = list(state["free"]), state["added"]
+
+
+_COLUMNS = ("_obs", "_action", "_own", "_terminated", "_truncated", "_end_of")

@@ -3,12 +3,13 @@
     y    = r(s, a, s') + gamma (1 - terminated) (min_i Q_i'(s', a') - alpha log pi(a'|s'))
     L_Q  = E[(Q_i(s, a) - y)^2],   L_pi = E[alpha log pi(a|s) - min_i Q_i(s, a)]
 
-Stable-Baselines3 does the steps and the updates, one update a step, interleaved in `collect`. Its replay
-buffer asks a `RewardFn` at the moment it is sampled, so no stored reward can go stale; a time limit is
-no termination.
+The networks are those of Stable-Baselines3's `SAC`; stepping and updating are interleaved in `collect`.
+Each batch asks the `RewardFn` when it is drawn, so no stored reward can go stale; a time limit is no
+termination.
 
-Differs from the paper: observations are clipped at +-10 standard deviations, as `Policy` does; the
-exported policy may be a moving average of the weights.
+Differs from the paper: observations are clipped at +-10 standard deviations, as `Policy` does; several
+environments may be stepped at once and updated from less or more than once a step; the exported policy
+may be a moving average of the weights.
 """
 
 from dataclasses import dataclass
@@ -18,17 +19,17 @@ import numpy as np
 import torch
 from gymnasium.spaces import Box
 from stable_baselines3 import SAC
-from stable_baselines3.common.logger import Logger
 from stable_baselines3.sac.policies import Actor
 from torch import Tensor, nn
 
 from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
+from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
-from irl.learners.random_state import read_global, write_global
-from irl.learners.replay import RewardedReplay
+from irl.learners.replay import Replay
+from irl.learners.sac_update import SACUpdate
 from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
 from irl.policies.policy import Policy, PolicySpec
@@ -39,8 +40,12 @@ class SACConfig:
     """How the policy is improved."""
 
     KIND: ClassVar[str] = "sac"
+    n_envs: int = 1
+    """Environments stepped at once."""
     steps_per_round: int = 1000
-    """Environment steps between two reports, with one update each."""
+    """Environment steps between two reports; a multiple of `n_envs`."""
+    updates_per_step: float = 1.0
+    """Updates per environment step."""
     learning_starts: int = 5000
     """Steps of uniformly random actions before the first update."""
     batch_size: int = 256
@@ -57,22 +62,29 @@ class SACConfig:
     """How far the target critics follow at each update."""
     hidden: tuple[int, ...] = (256, 256)
     """Width of each hidden layer of actor and critics, ReLU between."""
+    products: Literal["float32", "bfloat16"] = "float32"
+    """Number format of hidden layers' products. bfloat16 is faster where the CPU has it, and rounds to
+    three digits: results differ from float32's as two seeds do."""
     average: float = 0.0
     """Decay a round of the moving average of weights that is exported; 0 exports the newest."""
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "steps_per_round", "batch_size", "buffer_size")
-        check_at_least(self, 0, "learning_starts", "lr", "tau")
+        check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "buffer_size")
+        check_at_least(self, 0, "learning_starts", "lr", "tau", "updates_per_step")
+        if self.steps_per_round % self.n_envs:
+            raise ValueError(
+                f"steps_per_round must be a multiple of n_envs ({self.n_envs}), not {self.steps_per_round}"
+            )
         for name in ("gamma", "average"):
             if not 0.0 <= (value := getattr(self, name)) < 1.0:
                 raise ValueError(f"{name} must be in [0, 1), not {value}")
 
 
 class SACLearner:
-    """Steps one environment and updates after each step.
+    """Steps environments and updates after each step.
 
-    For `learning_starts` steps actions are random and nothing is learned.
-    SB3 draws from the global numpy and torch generators, seeded here.
+    For `learning_starts` steps actions are random and nothing is learned. SB3 seeds the global
+    generators and draws the first weights from them; nothing after that does.
     """
 
     def __init__(
@@ -87,20 +99,35 @@ class SACLearner:
         device: str = "cpu",
     ) -> None:
         """`normaliser` is kept as it is; without one, observations are only clipped."""
-        self.config, self.env_id = config, env_id
-        self.venv = RecordingVecEnv(env_id, env_seeds[:1])
+        self.config, self.env_id, self._total_steps = config, env_id, total_steps
+        self.venv = RecordingVecEnv(env_id, env_seeds)
+        self._box = self.venv.action_space
         assert self.venv.observation_space.shape is not None
-        self._normaliser = normaliser or Normaliser(self.venv.observation_space.shape[0])
-        self.model = SAC(
+        assert isinstance(self._box, Box)
+        obs_size = self.venv.observation_space.shape[0]
+        self._normaliser = (normaliser or Normaliser(obs_size)).to(device)
+        self.model = self._sb3(seed, device)
+        self._rng = torch_stream(seed, "sac", device)
+        dtype = torch.bfloat16 if config.products == "bfloat16" else torch.float32
+        self._update = SACUpdate(self.model, self._normaliser, self._rng, dtype)
+        capacity = min(config.buffer_size, total_steps + config.steps_per_round)
+        self.replay = Replay(capacity, config.n_envs, obs_size, self._box.shape[0], device)
+        self._average = WeightAverage(_actor_weights(self.model.actor), config.average)
+        self._rate = learning_rate(config.lr, config.lr_schedule)
+        self._env_steps, self._owed = 0, 0.0
+        self._obs = self.venv.reset()
+
+    def _sb3(self, seed: int, device: str) -> SAC:
+        config = self.config
+        return SAC(
             "MlpPolicy",
             self.venv,
             learning_rate=learning_rate(config.lr, config.lr_schedule),
-            buffer_size=min(config.buffer_size, total_steps + config.steps_per_round),
+            buffer_size=1,  # SB3's own memory is not used
             learning_starts=config.learning_starts,
             batch_size=config.batch_size,
             tau=config.tau,
             gamma=config.gamma,
-            replay_buffer_class=RewardedReplay,
             policy_kwargs={
                 "net_arch": list(config.hidden),
                 "features_extractor_class": NormalisedFeatures,
@@ -109,24 +136,16 @@ class SACLearner:
             seed=seed,
             device=device,
         )
-        self.model.set_logger(Logger(folder=None, output_formats=[]))
-        self._average = WeightAverage(_actor_weights(self.model.actor), config.average)
-        _, self._callback = self.model._setup_learn(total_steps, callback=None)
 
     @property
     def env_steps(self) -> int:
         """Environment steps taken so far."""
-        return self.model.num_timesteps
+        return self._env_steps
 
     @property
     def reward_scale(self) -> float:
         """Rewards reach SAC as they are."""
         return 1.0
-
-    @property
-    def _replay(self) -> RewardedReplay:
-        assert isinstance(self.model.replay_buffer, RewardedReplay)
-        return self.model.replay_buffer
 
     def take_finished(self) -> list[tuple[float, int]]:
         """Return (the environment's own) and length of each episode that ended since the last call."""
@@ -134,37 +153,58 @@ class SACLearner:
 
     def start(self, reward: RewardFn) -> None:
         """Name the reward that every sampled batch is given."""
-        self._replay.reward = reward
+        self._reward = reward
 
     def collect(self) -> Transitions:
-        """The steps of one round; each is followed by an update once the random ones are over."""
-        model, config = self.model, self.config
-        for _ in range(config.steps_per_round):
-            model.collect_rollouts(
-                self.venv,
-                self._callback,
-                model.train_freq,  # pyright: ignore[reportArgumentType]
-                self._replay,
-                learning_starts=config.learning_starts,
-            )
-            if model.num_timesteps > config.learning_starts:
-                model.train(gradient_steps=1, batch_size=config.batch_size)
-        self._average.update(_actor_weights(model.actor))
-        return self.venv.take().to(model.device)
+        """The steps of one round; each is followed by its updates once the random ones are over."""
+        for _ in range(self.config.steps_per_round // self.config.n_envs):
+            self._step()
+            if self._env_steps > self.config.learning_starts:
+                self._owed += self.config.updates_per_step * self.config.n_envs
+            while self._owed >= 1.0:
+                self._learn()
+                self._owed -= 1.0
+        self._average.update(_actor_weights(self.model.actor))
+        return self.venv.take().to(self.model.device)
+
+    def _step(self) -> None:
+        action = self._random() if self._env_steps < self.config.learning_starts else self._act()
+        obs, _, dones, infos = self.venv.step(action)
+        next_obs = obs.copy()
+        for i in np.flatnonzero(dones).tolist():
+            next_obs[i] = infos[i]["terminal_observation"]
+        truncated = np.array([bool(info.get("TimeLimit.truncated")) for info in infos]) & dones
+        own = np.array([info["own_reward"] for info in infos])
+        self.replay.add(self._obs, action, next_obs, dones & ~truncated, truncated, own)
+        self._obs = obs
+        self._env_steps += len(dones)
+
+    def _random(self) -> np.ndarray:
+        low, high = torch.from_numpy(self._box.low), torch.from_numpy(self._box.high)
+        drawn = torch.rand(self.config.n_envs, len(low), generator=self._rng, device=self._rng.device)
+        return (low + drawn.cpu() * (high - low)).numpy()
+
+    @torch.no_grad()
+    def _act(self) -> np.ndarray:
+        obs = torch.as_tensor(self._obs, dtype=torch.float32, device=self.model.device)
+        action, _ = self._update.sample(self._update.features(obs))
+        return np.clip(self._update.unscaled(action).cpu().numpy(), self._box.low, self._box.high)
+
+    def _learn(self) -> None:
+        batch = self.replay.sample(self.config.batch_size, self._rng)
+        with torch.no_grad():
+            reward = self._reward(batch).float()
+        remaining = 1.0 - self._env_steps / self._total_steps
+        self._update(batch, reward, self._rate(remaining) if callable(self._rate) else self._rate)
 
     def improve(self, reward: RewardFn) -> Metrics:
-        """Name the reward of the next rounds; what the last updates were like."""
-        self._replay.reward = reward
-        logged = self.model.logger.name_to_value
-        names = [name for name in ("actor_loss", "critic_loss", "ent_coef") if f"train/{name}" in logged]
-        metrics = {f"sac/{name}": float(logged[f"train/{name}"]) for name in names}
-        logged.clear()
-        return metrics
+        """Name the reward of the next rounds; what the last update was like."""
+        self._reward = reward
+        return self._update.metrics()
 
     def policy(self) -> Policy:
         """The current policy, exported: a copy that later updates leave alone."""
-        box = self.venv.action_space
-        assert isinstance(box, Box)
+        box = self._box
         weights = {name: weight.numpy().copy() for name, weight in self._average.weights.items()}
         mean, std = self._normaliser.mean, self._normaliser.std
         weights |= {"obs_mean": mean.cpu().numpy().copy(), "obs_std": std.cpu().numpy().copy()}
@@ -176,44 +216,34 @@ class SACLearner:
 
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on, between two rounds."""
-        model = self.model
-        assert model.ent_coef_optimizer is not None
         return {
-            "policy": model.policy.state_dict(),
-            "optimizers": [optimizer.state_dict() for optimizer in self._optimizers()],
-            "log_ent_coef": model.log_ent_coef,
-            "steps": (model.num_timesteps, model._n_updates, model._episode_num),
-            "last_obs": model._last_obs,
-            "replay": self._replay.state_dict(),
+            "policy": self.model.policy.state_dict(),
+            "optimizers": [optimizer.state_dict() for optimizer in self._update.optimizers],
+            "log_ent_coef": self.model.log_ent_coef,
+            "steps": (self._env_steps, self._owed),
+            "last_obs": self._obs,
+            "replay": self.replay.state_dict(),
             "average": self._average.state_dict(),
             "environments": self.venv.state_dict(),
-            "global_random": read_global(),
-            "action_space": dict(self.venv.action_space.np_random.bit_generator.state),
+            "rng": self._rng.get_state(),
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go on where another learner of the same settings was; `start` names the reward."""
-        model = self.model
-        model.policy.load_state_dict(state["policy"])
-        for optimizer, its in zip(self._optimizers(), state["optimizers"], strict=True):
+        self.model.policy.load_state_dict(state["policy"])
+        self._update.refresh()
+        for optimizer, its in zip(self._update.optimizers, state["optimizers"], strict=True):
             optimizer.load_state_dict(its)
         with torch.no_grad():
-            assert isinstance(model.log_ent_coef, Tensor)
-            model.log_ent_coef.copy_(state["log_ent_coef"])
-        model.num_timesteps, model._n_updates, model._episode_num = state["steps"]
-        model._last_obs = state["last_obs"]
-        self._replay.load_state_dict(state["replay"])
+            assert isinstance(self.model.log_ent_coef, Tensor)
+            self.model.log_ent_coef.copy_(state["log_ent_coef"])
+        self._env_steps, self._owed = state["steps"]
+        self._obs = state["last_obs"]
+        self.replay.load_state_dict(state["replay"])
         self._average.load_state_dict(state["average"])
         self.venv.load_state_dict(state["environments"])
-        assert isinstance(model._last_obs, np.ndarray)
-        self.venv.resume_from(model._last_obs)
-        write_global(state["global_random"])
-        self.venv.action_space.np_random.bit_generator.state = state["action_space"]
-
-    def _optimizers(self) -> list[torch.optim.Optimizer]:
-        model = self.model
-        assert model.ent_coef_optimizer is not None
-        return [model.actor.optimizer, model.critic.optimizer, model.ent_coef_optimizer]
+        self.venv.resume_from(self._obs)
+        self._rng.set_state(state["rng"])
 
     def close(self) -> None:
         """Close the environment."""
