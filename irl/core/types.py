@@ -79,6 +79,12 @@ class Transitions:
     reward: Float[Tensor, "B"] | None = None
     """The environment's own reward where it was recorded; no learner reads it."""
     terms: Mapping[str, Float[Tensor, "B"]] = field(default_factory=dict)
+    weight: Float[Tensor, "B"] | None = None
+    """How many steps a row stands for, where steps were left out; None is 1 for each."""
+    absorbing: Bool[Tensor, "B"] | None = None
+    """Whether obs is s_abs, the state after a termination, whose row of obs is zeros; None is never."""
+    next_absorbing: Bool[Tensor, "B"] | None = None
+    """Whether next_obs is s_abs."""
 
     def __post_init__(self) -> None:
         sizes = {
@@ -112,11 +118,15 @@ class Transitions:
 
     def _columns(self) -> dict[str, Tensor | None]:
         names = ("obs", "action", "next_obs", "terminated", "truncated", "reward")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in (*names, *_FILLED)}
 
     def _map(self, change) -> "Transitions":
         columns = {k: None if v is None else change(v) for k, v in self._columns().items()}
         return Transitions(**columns, terms={k: change(v) for k, v in self.terms.items()})  # pyright: ignore[reportArgumentType]
+
+
+_FILLED = {"weight": 1.0, "absorbing": False, "next_absorbing": False}
+"""Columns that may be missing, and what a missing one means in every row."""
 
 
 def from_episodes(episodes: Sequence[Episode]) -> Transitions:
@@ -151,7 +161,10 @@ def from_episodes(episodes: Sequence[Episode]) -> Transitions:
 
 
 def concatenate(batches: Sequence[Transitions]) -> Transitions:
-    """One batch of all, in order; reward and terms stay where every part has them."""
+    """One batch of all, in order.
+
+    Reward and terms stay where every part has them; weight and flags where any has, 1 and False elsewhere.
+    """
     if not batches:
         raise ValueError("expected at least one batch, got none")
     rewards = [b.reward for b in batches if b.reward is not None]
@@ -164,6 +177,18 @@ def concatenate(batches: Sequence[Transitions]) -> Transitions:
         truncated=torch.cat([b.truncated for b in batches]),
         reward=torch.cat(rewards) if len(rewards) == len(batches) else None,
         terms={k: torch.cat([b.terms[k] for b in batches]) for k in shared},
+        **{name: _filled(name, batches) for name in _FILLED},
+    )
+
+
+def _filled(name: str, batches: Sequence[Transitions]) -> Tensor | None:
+    columns: list[Tensor | None] = [getattr(b, name) for b in batches]
+    like = next((column for column in columns if column is not None), None)
+    if like is None:
+        return None
+    fill = _FILLED[name]
+    return torch.cat(
+        [like.new_full((len(b),), fill) if c is None else c for b, c in zip(batches, columns, strict=True)]
     )
 
 

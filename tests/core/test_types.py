@@ -13,6 +13,7 @@ from irl.core.types import Episode, Transitions, concatenate, from_episodes
 
 lengths_of_episodes = st.lists(st.integers(1, 6), min_size=1, max_size=5)
 COLUMNS = ("obs", "action", "next_obs", "terminated", "truncated")
+OPTIONAL = ("reward", "weight", "absorbing", "next_absorbing")
 
 
 @pytest.fixture
@@ -45,12 +46,15 @@ def numbered(steps: int, **changes: Any) -> Transitions:
         "truncated": count % 3 == 0,
         "reward": 10.0 * count.double(),
         "terms": {"term": 100.0 * count.double()},
+        "weight": 1.0 + count,
+        "absorbing": count % 4 == 0,
+        "next_absorbing": count % 5 == 0,
     }
     return Transitions(**(given | changes))
 
 
 def same(a: Transitions, b: Transitions) -> bool:
-    pairs = [(getattr(a, name), getattr(b, name)) for name in (*COLUMNS, "reward")]
+    pairs = [(getattr(a, name), getattr(b, name)) for name in (*COLUMNS, *OPTIONAL)]
     pairs += [(a.terms[name], b.terms[name]) for name in a.terms] if a.terms.keys() == b.terms.keys() else []
     return a.terms.keys() == b.terms.keys() and all(
         (x is None and y is None) or (x is not None and y is not None and torch.equal(x, y)) for x, y in pairs
@@ -131,7 +135,7 @@ def test_nothing_makes_no_batch() -> None:
 
 
 @pytest.mark.usefixtures("unchecked")
-@pytest.mark.parametrize("column", [*COLUMNS, "reward", "terms"])
+@pytest.mark.parametrize("column", [*COLUMNS, *OPTIONAL, "terms"])
 def test_columns_of_unequal_length_are_refused(column: str) -> None:
     short = numbered(2)
     with pytest.raises(ValueError, match=r"expected columns of one length: .*: 2[,}]"):
@@ -202,7 +206,17 @@ def test_concatenate_keeps_reward_and_terms_where_every_part_has_them() -> None:
         assert joined.terms == {}
 
 
+@pytest.mark.parametrize("name", ["weight", "absorbing", "next_absorbing"])
+def test_concatenate_fills_what_a_part_does_not_say(name: str) -> None:
+    bare = numbered(2, weight=None, absorbing=None, next_absorbing=None)
+    said = getattr(numbered(3), name)
+    meaning = torch.ones(2) if name == "weight" else torch.zeros(2, dtype=torch.bool)
+    assert getattr(concatenate([bare, bare]), name) is None
+    assert torch.equal(getattr(concatenate([numbered(3), bare]), name), torch.cat([said, meaning]))
+    assert torch.equal(getattr(concatenate([bare, numbered(3)]), name), torch.cat([meaning, said]))
+
+
 def test_every_column_moves_to_another_device() -> None:
     moved = numbered(3).to("meta")
-    columns = [getattr(moved, name) for name in (*COLUMNS, "reward")] + list(moved.terms.values())
+    columns = [getattr(moved, name) for name in (*COLUMNS, *OPTIONAL)] + list(moved.terms.values())
     assert {column.device.type for column in columns} == {"meta"}
