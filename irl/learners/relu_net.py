@@ -65,7 +65,7 @@ class _Evaluate(torch.autograd.Function):
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx, *gradients: Tensor):
+    def backward(ctx, *gradients: Tensor):  # pyright: ignore[reportIncompatibleMethodOverride]
         (g,), net, activations = gradients, ctx.net, ctx.saved_tensors
         needs_x, needs_weights, _ = ctx.needs_input_grad
         if needs_weights:

@@ -101,9 +101,10 @@ class SACLearner:
         """`normaliser` is kept as it is; without one, observations are only clipped."""
         self.config, self.env_id, self._total_steps = config, env_id, total_steps
         self.venv = RecordingVecEnv(env_id, env_seeds)
-        self._box = self.venv.action_space
+        box = self.venv.action_space
+        assert isinstance(box, Box)
+        self._low, self._high = box.low, box.high
         assert self.venv.observation_space.shape is not None
-        assert isinstance(self._box, Box)
         obs_size = self.venv.observation_space.shape[0]
         self._normaliser = (normaliser or Normaliser(obs_size)).to(device)
         self.model = self._sb3(seed, device)
@@ -111,11 +112,11 @@ class SACLearner:
         dtype = torch.bfloat16 if config.products == "bfloat16" else torch.float32
         self._update = SACUpdate(self.model, self._normaliser, self._rng, dtype)
         capacity = min(config.buffer_size, total_steps + config.steps_per_round)
-        self.replay = Replay(capacity, config.n_envs, obs_size, self._box.shape[0], device)
+        self.replay = Replay(capacity, config.n_envs, obs_size, len(self._low), device)
         self._average = WeightAverage(_actor_weights(self.model.actor), config.average)
         self._rate = learning_rate(config.lr, config.lr_schedule)
         self._env_steps, self._owed = 0, 0.0
-        self._obs = self.venv.reset()
+        self.venv.reset()
 
     def _sb3(self, seed: int, device: str) -> SAC:
         config = self.config
@@ -168,27 +169,19 @@ class SACLearner:
         return self.venv.take().to(self.model.device)
 
     def _step(self) -> None:
-        action = self._random() if self._env_steps < self.config.learning_starts else self._act()
-        obs, _, dones, infos = self.venv.step(action)
-        next_obs = obs.copy()
-        for i in np.flatnonzero(dones).tolist():
-            next_obs[i] = infos[i]["terminal_observation"]
-        truncated = np.array([bool(info.get("TimeLimit.truncated")) for info in infos]) & dones
-        own = np.array([info["own_reward"] for info in infos])
-        self.replay.add(self._obs, action, next_obs, dones & ~truncated, truncated, own)
-        self._obs = obs
-        self._env_steps += len(dones)
+        self.venv.step(self._random() if self._env_steps < self.config.learning_starts else self._act())
+        self.replay.add(*self.venv.last_step)
+        self._env_steps += self.config.n_envs
 
     def _random(self) -> np.ndarray:
-        low, high = torch.from_numpy(self._box.low), torch.from_numpy(self._box.high)
-        drawn = torch.rand(self.config.n_envs, len(low), generator=self._rng, device=self._rng.device)
-        return (low + drawn.cpu() * (high - low)).numpy()
+        drawn = torch.rand(len(self.venv.obs), len(self._low), generator=self._rng, device=self._rng.device)
+        return self._low + drawn.cpu().numpy() * (self._high - self._low)
 
     @torch.no_grad()
     def _act(self) -> np.ndarray:
-        obs = torch.as_tensor(self._obs, dtype=torch.float32, device=self.model.device)
+        obs = torch.as_tensor(self.venv.obs, dtype=torch.float32, device=self.model.device)
         action, _ = self._update.sample(self._update.features(obs))
-        return np.clip(self._update.unscaled(action).cpu().numpy(), self._box.low, self._box.high)
+        return np.clip(self._update.unscaled(action).cpu().numpy(), self._low, self._high)
 
     def _learn(self) -> None:
         batch = self.replay.sample(self.config.batch_size, self._rng)
@@ -204,12 +197,11 @@ class SACLearner:
 
     def policy(self) -> Policy:
         """The current policy, exported: a copy that later updates leave alone."""
-        box = self._box
         weights = {name: weight.numpy().copy() for name, weight in self._average.weights.items()}
         mean, std = self._normaliser.mean, self._normaliser.std
         weights |= {"obs_mean": mean.cpu().numpy().copy(), "obs_std": std.cpu().numpy().copy()}
-        weights |= {"action_low": box.low, "action_high": box.high}
-        sizes = (len(mean), len(box.low))
+        weights |= {"action_low": self._low, "action_high": self._high}
+        sizes = (len(mean), len(self._low))
         return Policy(
             PolicySpec(self.env_id, *sizes, self.config.hidden, "relu", "squashed_gaussian"), weights
         )
@@ -221,7 +213,7 @@ class SACLearner:
             "optimizers": [optimizer.state_dict() for optimizer in self._update.optimizers],
             "log_ent_coef": self.model.log_ent_coef,
             "steps": (self._env_steps, self._owed),
-            "last_obs": self._obs,
+            "last_obs": self.venv.obs,
             "replay": self.replay.state_dict(),
             "average": self._average.state_dict(),
             "environments": self.venv.state_dict(),
@@ -238,11 +230,10 @@ class SACLearner:
             assert isinstance(self.model.log_ent_coef, Tensor)
             self.model.log_ent_coef.copy_(state["log_ent_coef"])
         self._env_steps, self._owed = state["steps"]
-        self._obs = state["last_obs"]
         self.replay.load_state_dict(state["replay"])
         self._average.load_state_dict(state["average"])
         self.venv.load_state_dict(state["environments"])
-        self.venv.resume_from(self._obs)
+        self.venv.resume_from(state["last_obs"])
         self._rng.set_state(state["rng"])
 
     def close(self) -> None:

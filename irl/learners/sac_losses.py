@@ -30,7 +30,7 @@ def td_target(
     ended: Bool[Tensor, "B"],
     gamma: float,
 ) -> Float[Tensor, "B"]:
-    """y = r + gamma V(s'), where V is 0 after a termination; a time limit is none."""
+    """Y = r + gamma V(s'), where V is 0 after a termination; a time limit is none."""
     return reward + gamma * next_value * (~ended)
 
 

@@ -64,7 +64,8 @@ class SACUpdate:
         actor = actor_loss(value, log_pi, temperature, None)
         _step(of_actor, actor, self._actor)
         self._follow()
-        self._losses = {"actor_loss": actor.detach(), "critic_loss": critics.detach(), "ent_coef": temperature}  # fmt: skip
+        losses = {"actor_loss": actor.detach(), "critic_loss": critics.detach(), "ent_coef": temperature}
+        self._losses = losses
 
     @torch.no_grad()
     def _follow(self) -> None:

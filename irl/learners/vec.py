@@ -59,6 +59,16 @@ class RecordingVecEnv(VecEnvWrapper):
         self._obs = obs
         return obs, np.zeros_like(rewards), dones, infos
 
+    @property
+    def obs(self) -> np.ndarray:
+        """What the next action answers to: after an episode's end, the first of the next one."""
+        return self._obs
+
+    @property
+    def last_step(self) -> tuple[np.ndarray, ...]:
+        """obs, action, the true next obs, terminated, truncated and own reward of the newest step."""
+        return self._steps[-1]
+
     def take(self) -> Transitions:
         """Every step since the last call, time-major: row t * N + i is step t of environment i."""
         columns = [np.stack(column) for column in zip(*self._steps, strict=True)]

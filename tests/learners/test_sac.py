@@ -24,7 +24,11 @@ def weights(of: SACLearner) -> dict[str, Tensor]:
     return {name: value.clone() for name, value in of.model.policy.state_dict().items()}
 
 
-def test_a_drawn_batch_is_judged_in_environment_units_with_its_ends() -> None:
+def rows(*columns: Tensor) -> set[tuple[float, ...]]:
+    return {tuple(np.round(row, 4)) for row in torch.cat(columns, 1).tolist()}
+
+
+def test_a_drawn_batch_is_judged_in_environment_units_with_the_newest_reward() -> None:
     seen: list[Transitions] = []
 
     def remember(batch: Transitions) -> Tensor:
@@ -32,15 +36,15 @@ def test_a_drawn_batch_is_judged_in_environment_units_with_its_ends() -> None:
         return batch.obs[:, 0]
 
     ours = learner("Pendulum-v1")  # actions within +-2
-    ours.start(remember)
-    steps = ours.collect()
-    drawn = ours._replay.sample(64)
-    (batch,) = seen
-    assert batch.action.abs().max() > 1.5
-    torch.testing.assert_close(drawn.actions, batch.action / 2.0)
-    torch.testing.assert_close(drawn.rewards[:, 0], batch.obs[:, 0])
-    rows = {tuple(np.round(row, 4)) for row in torch.cat([steps.obs, steps.action], 1).tolist()}
-    assert {tuple(np.round(row, 4)) for row in torch.cat([batch.obs, batch.action], 1).tolist()} <= rows
+    ours.start(HandWritten())
+    steps = [ours.collect(), ours.collect()]
+    ours.improve(remember)
+    steps.append(ours.collect())
+    assert len(seen) == 100
+    assert {len(batch) for batch in seen} == {32}
+    judged = set.union(*(rows(batch.obs, batch.action) for batch in seen))
+    assert judged <= set.union(*(rows(batch.obs, batch.action) for batch in steps))
+    assert max(float(batch.action.abs().max()) for batch in seen) > 1.5
 
 
 def test_a_time_limit_is_no_termination_and_the_next_observation_is_the_true_one() -> None:
@@ -48,21 +52,36 @@ def test_a_time_limit_is_no_termination_and_the_next_observation_is_the_true_one
     ours.start(HandWritten())
     steps = ours.collect()
     assert steps.truncated.any()
-    drawn = ours._replay.sample(500)
-    assert (drawn.dones == 0).all()
-    rows = {tuple(np.round(row, 4)) for row in torch.cat([steps.obs, steps.next_obs], 1).tolist()}
-    pairs = torch.cat([drawn.observations, drawn.next_observations], 1)
-    assert {tuple(np.round(row, 4)) for row in pairs.tolist()} <= rows
+    drawn = ours.replay.sample(500, torch.Generator().manual_seed(0))
+    assert not drawn.terminated.any()
+    assert drawn.truncated.any()
+    assert rows(drawn.obs, drawn.next_obs) <= rows(steps.obs, steps.next_obs)
 
 
 def test_the_environments_own_reward_is_there_for_a_reward_that_asks() -> None:
     ours = learner()
     ours.start(HandWritten())
     steps = ours.collect()
+    drawn = ours.replay.sample(200, torch.Generator().manual_seed(0))
     assert steps.reward is not None
-    drawn = ours._replay.sample(200).rewards[:, 0]
-    known = set(np.round(steps.reward.numpy(), 4))
-    assert set(np.round(drawn.double().numpy(), 4)) <= known
+    assert drawn.reward is not None
+    assert set(np.round(drawn.reward.double().numpy(), 4)) <= set(np.round(steps.reward.numpy(), 4))
+
+
+def test_half_an_update_a_step_of_several_environments_is_half_as_many() -> None:
+    drawn = 0
+
+    def count(batch: Transitions) -> Tensor:
+        nonlocal drawn
+        drawn += 1
+        return torch.zeros(len(batch))
+
+    config = replace(SMALL, n_envs=4, updates_per_step=0.5, learning_starts=100)
+    ours = SACLearner("Cliff-v0", [1, 2, 3, 4], config, seed=0, total_steps=600)
+    ours.start(count)
+    sizes = [len(ours.collect()) for _ in range(3)]
+    assert sizes == [100, 100, 100]
+    assert drawn == 100
 
 
 def test_nan_from_the_environment_leaves_the_weights_bit_equal() -> None:
@@ -85,7 +104,7 @@ def test_the_exported_policy_acts_as_the_library_predicts() -> None:
 
 
 def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(tmp_path: Path) -> None:
-    config = replace(SMALL, lr_schedule="linear", average=0.5)
+    config = replace(SMALL, lr_schedule="linear", average=0.5, products="bfloat16", updates_per_step=0.7)
     straight = learner(config=config)
     straight.start(HandWritten())
     for round_ in range(5):

@@ -1,0 +1,68 @@
+"""The memory against a slow one that keeps every transition as it came."""
+
+import numpy as np
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from irl.core.types import Transitions
+from irl.learners.replay import Replay
+
+O, A = 3, 2  # noqa: E741
+
+
+def play(replay: Replay, steps: int, seed: int, first: int = 0) -> list[tuple[float, ...]]:
+    """Random episodes of N environments; every transition as one row of numbers."""
+    rng, n = np.random.default_rng(seed), replay.n_envs
+    obs = rng.normal(size=(n, O))
+    kept = []
+    for _ in range(first, steps):
+        action, own = rng.normal(size=(n, A)), rng.normal(size=n)
+        end = rng.random((2, n)) < 0.2
+        next_obs = rng.normal(size=(n, O))
+        replay.add(obs, action, next_obs, end[0], end[1] & ~end[0], own)
+        columns = (obs, action, next_obs, end[0][:, None], (end[1] & ~end[0])[:, None], own[:, None])
+        kept += [tuple(row) for row in np.concatenate(columns, 1, dtype=np.float32).tolist()]
+        reset = rng.normal(size=(n, O))
+        obs = np.where((end[0] | end[1])[:, None], reset, next_obs)
+    return kept
+
+
+def flat(batch: Transitions) -> list[tuple[float, ...]]:
+    assert batch.reward is not None
+    ends = torch.stack([batch.terminated, batch.truncated, batch.reward], 1).float()
+    return [
+        tuple(row) for row in torch.cat([batch.obs, batch.action, batch.next_obs, ends], 1).numpy().tolist()
+    ]
+
+
+def everything(replay: Replay) -> set[tuple[float, ...]]:
+    drawn = replay.sample(60 * len(replay) + 60, torch.Generator().manual_seed(0))
+    return set(flat(drawn))
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(n=st.integers(1, 3), capacity=st.integers(1, 12), steps=st.integers(1, 60), seed=st.integers(0, 10**6))
+def test_what_is_drawn_is_the_newest_that_came(n: int, capacity: int, steps: int, seed: int) -> None:
+    replay = Replay(capacity, n, O, A)
+    came = play(replay, steps, seed)
+    assert len(replay) >= min(capacity, len(came))
+    assert everything(replay) == set(came[-len(replay) :])
+
+
+def test_the_side_table_of_ends_does_not_grow_with_time() -> None:
+    replay = Replay(20, 2, O, A)
+    play(replay, 2000, seed=0)
+    assert len(replay._ends) <= 32
+
+
+def test_a_memory_goes_on_where_another_was() -> None:
+    one, other = Replay(15, 2, O, A), Replay(15, 2, O, A)
+    play(one, 23, seed=1)
+    other.load_state_dict(one.state_dict())
+    assert everything(one) == everything(other)
+    play(one, 9, seed=2)
+    play(other, 9, seed=2)
+    assert everything(one) == everything(other)
+    draws = [r.sample(7, torch.Generator().manual_seed(3)) for r in (one, other)]
+    assert flat(draws[0]) == flat(draws[1])
