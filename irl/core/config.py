@@ -4,6 +4,7 @@
 `KIND: ClassVar[str]`, which is written as "kind" and decides on the way back.
 """
 
+import sys
 import types
 import typing
 from dataclasses import fields, is_dataclass
@@ -61,28 +62,28 @@ def from_json(cls: Any, content: Any, where: str = "config") -> Any:
     origin, arguments = get_origin(cls), get_args(cls)
     if origin in (typing.Union, types.UnionType):
         return _union(arguments, content, where)
-    if origin is typing.Literal and content in arguments:
-        return content
     if origin is tuple and isinstance(content, list):
         return tuple(from_json(arguments[0], item, f"{where}[{i}]") for i, item in enumerate(content))
     if origin is dict and isinstance(content, dict):
-        return content
+        return {key: from_json(arguments[1], value, f"{where}.{key}") for key, value in content.items()}
     if cls is Path and isinstance(content, str):
         return Path(content)
-    if cls is float and isinstance(content, int) and not isinstance(content, bool):
+    if cls is float and _fits_a_float(content):
         return float(content)
-    if cls in (bool, int, float, str) and type(content) is cls:
+    if cls is Any or (cls in (bool, int, str) and type(content) is cls):
+        return content
+    if origin is typing.Literal and content in arguments:
         return content
     expected = ", ".join(map(repr, arguments)) if origin is typing.Literal else getattr(cls, "__name__", cls)
-    raise UserError(f"{where}: expected {expected}, found {content!r}")
+    raise UserError(f"{where}: expected {expected}, found {_short(content)}")
 
 
 def _dataclass(cls: type, content: Any, where: str) -> Any:
     if not isinstance(content, dict):
-        raise UserError(f"{where}: expected the settings of {cls.__name__}, found {content!r}")
+        raise UserError(f"{where}: expected the settings of {cls.__name__}, found {_short(content)}")
     given, kind = dict(content), getattr(cls, "KIND", None)
     if kind and given.pop("kind", kind) != kind:
-        raise UserError(f"{where}: expected kind {kind!r}, found {content['kind']!r}")
+        raise UserError(f"{where}: expected kind {kind!r}, found {_short(content['kind'])}")
     hints = get_type_hints(cls)
     names = [field.name for field in fields(cls)]
     if unknown := sorted(set(given) - set(names)):
@@ -96,6 +97,11 @@ def _dataclass(cls: type, content: Any, where: str) -> Any:
         raise UserError(f"{where}: {error}") from error
 
 
+def _fits_a_float(content: Any) -> bool:
+    # JSON as Python reads it has NaN, infinity and integers that no float holds
+    return type(content) in (int, float) and abs(content) <= sys.float_info.max
+
+
 def _union(members: tuple[Any, ...], content: Any, where: str) -> Any:
     if content is None and type(None) in members:
         return None
@@ -104,6 +110,16 @@ def _union(members: tuple[Any, ...], content: Any, where: str) -> Any:
         return from_json(members[0], content, where)
     kinds = {member.KIND: member for member in members}
     kind = content.get("kind") if isinstance(content, dict) else None
-    if kind not in kinds:
-        raise UserError(f"{where}: kind is one of {', '.join(kinds)}, found {kind!r}")
+    if not isinstance(kind, str) or kind not in kinds:
+        raise UserError(f"{where}: kind is one of {', '.join(kinds)}, found {_short(kind)}")
     return from_json(kinds[kind], content, where)
+
+
+def _short(content: Any) -> str:
+    """The value in at most 60 characters; whatever was given, the message stays a line."""
+    try:
+        shown = repr(content)
+    except ValueError:
+        # Python refuses to write integers of thousands of digits
+        shown = f"an integer of {content.bit_length()} bits"
+    return shown if len(shown) <= 60 else f"{shown[:57]}..."

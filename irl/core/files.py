@@ -7,9 +7,10 @@ import hashlib
 import json
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +18,23 @@ from irl.core.errors import UserError
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Replace `path` by `content` in one step: a reader sees the old file or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(aside, 0o644)
-        os.replace(aside, path)
-    except BaseException:
-        Path(aside).unlink(missing_ok=True)
-        raise
+    """Replace `path` by `content` in one step: a reader sees the old file or the new one.
+
+    Raises:
+        OSError: it cannot be written, e.g. the disk is full; names `path`. Nothing is left behind.
+    """
+    with _named(path), _parents(path):
+        handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(aside, 0o644)
+            os.replace(aside, path)
+        except BaseException:
+            Path(aside).unlink(missing_ok=True)
+            raise
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -45,13 +50,21 @@ def read_json(path: Path) -> Any:
     """The content of a JSON file.
 
     Raises:
-        UserError: the file is missing, cut off or not JSON.
+        UserError: the file is missing, no file, cut off or not JSON, or names a key twice.
     """
     try:
-        return json.loads(path.read_text())
+        if not stat.S_ISREG(path.stat().st_mode):
+            # a pipe would be waited for, a device could be without end
+            raise UserError(f"{path} is not a file; expected JSON")
+        return json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_object)
     except FileNotFoundError as error:
         raise UserError(f"no file {path}") from error
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except UserError:
+        raise
+    except RecursionError as error:
+        raise UserError(f"{path} is not readable JSON (nested too deeply)") from error
+    # ValueError: neither JSON nor UTF-8, a number of thousands of digits
+    except (OSError, ValueError) as error:
         raise UserError(f"{path} is not readable JSON ({error})") from error
 
 
@@ -61,24 +74,71 @@ def new_folder(path: Path) -> Iterator[Path]:
 
     A folder that was there is replaced.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
-    try:
-        yield aside
-        os.chmod(aside, 0o755)
-        if path.exists():
-            # moved, not deleted, until the new one has its place
-            replaced = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
-            os.rename(path, replaced)
-            os.rename(aside, path)
-            shutil.rmtree(replaced)
-        else:
-            os.rename(aside, path)
-    except BaseException:
-        shutil.rmtree(aside, ignore_errors=True)
-        raise
+    with _parents(path):
+        with _named(path):
+            aside = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
+        try:
+            yield aside
+            os.chmod(aside, 0o755)
+            if path.exists():
+                _replace(path, aside)
+            else:
+                os.rename(aside, path)
+        except BaseException:
+            shutil.rmtree(aside, ignore_errors=True)
+            raise
 
 
 def sha256(path: Path) -> str:
     """Hexadecimal SHA-256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _replace(path: Path, aside: Path) -> None:
+    """Put the folder `aside` where `path` is; the old one is moved until the new one has its place."""
+    replaced = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}."))
+    try:
+        os.rename(path, replaced)
+        try:
+            os.rename(aside, path)
+        except BaseException:
+            os.rename(replaced, path)
+            raise
+    except BaseException:
+        shutil.rmtree(replaced, ignore_errors=True)
+        raise
+    shutil.rmtree(replaced)
+
+
+@contextmanager
+def _parents(path: Path) -> Iterator[None]:
+    """The folders above `path`, made; those that were not there go again if the block fails."""
+    missing = [folder for folder in path.parents if not folder.exists()]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for folder in missing:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Names `path` in the system's errors: a failed write names no file, or the one aside."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = sorted({key for key in keys if keys.count(key) > 1})
+        raise ValueError(f"named twice: {', '.join(twice)}")
+    return found

@@ -17,9 +17,10 @@ from minari.namespace import NAMESPACE_METADATA_FILENAME
 from irl.core import files
 from irl.core.errors import UserError
 from irl.core.types import ActFn, Episode
+from irl.demos.episodes import DATA, check_episode
 from irl.demos.info import DemosInfo, show
 from irl.demos.root import datasets_root, minari_at
-from irl.demos.storage import check_id
+from irl.demos.storage import DIGEST, METADATA, check_id
 from irl.envs.make import make
 from irl.envs.rollouts import record
 from irl.envs.tasks import task_of
@@ -72,6 +73,9 @@ def generate(
 
 
 def _check_target(dataset_id: str, target: Path, overwrite: bool) -> None:
+    for folder in target.parents:
+        if (folder / "data" / METADATA).is_file():
+            raise UserError(f"{folder} is a dataset; choose another id than {dataset_id!r}, not inside it")
     if not target.exists():
         return
     # a folder of datasets must never be replaced by one of them
@@ -91,6 +95,10 @@ def _record_all(
     buffers = []
     for seed in seeds:
         episode, at_reset = record(env, act, seed)
+        try:
+            check_episode(len(buffers), episode)
+        except ValueError as error:
+            raise UserError(f"{env_id} cannot be demonstrated: {error}; nothing was written") from error
         buffers.append(_buffer(env_id, episode, at_reset))
         if on_episode is not None:
             on_episode(episode)
@@ -141,8 +149,14 @@ def _write(
             dataset.storage.update_episode_metadata(returns)
             os.rename(folder / "aside" / dataset_id / "data", folder / "data")
             shutil.rmtree(folder / "aside")
-    except OSError as error:
-        raise UserError(f"cannot write {target}: {error}") from error
+            metadata = files.read_json(folder / "data" / METADATA)
+            digest = files.sha256(folder / "data" / DATA)
+            files.write_json(folder / "data" / METADATA, metadata | {DIGEST: digest})
+    # RuntimeError: what h5py says where a file cannot be closed
+    except (OSError, RuntimeError) as error:
+        raise UserError(
+            f"cannot write {target}: {error}; free some space, or name another folder with --datasets-root"
+        ) from error
 
 
 def _mark_namespaces(root: Path, target: Path) -> None:

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from irl.core.errors import UserError
-from irl.demos.storage import env_id_of, open_dataset, read_episodes
+from irl.demos.storage import open_dataset, read_episodes
 
 
 @dataclass(frozen=True)
@@ -44,16 +43,12 @@ def show(dataset_id: str, root: Path | str | None = None) -> DemosInfo:
         UserError: not a dataset id, not there, empty or not readable.
     """
     dataset = open_dataset(dataset_id, root)
-    metadata = dataset.storage.metadata
-    data = Path(str(dataset.storage.data_path))
-    episodes = read_episodes(dataset)
-    if not episodes:
-        raise UserError(f"dataset {dataset_id} in {data} has no episode")
+    episodes = read_episodes(dataset, root)
     returns, lengths = [e.return_ for e in episodes], [len(e) for e in episodes]
     return DemosInfo(
         dataset_id=dataset_id,
-        env_id=env_id_of(dataset),
-        path=data.parent,
+        env_id=dataset.env_id,
+        path=dataset.path,
         episodes=len(episodes),
         steps=sum(lengths),
         return_mean=float(np.mean(returns)),
@@ -63,12 +58,12 @@ def show(dataset_id: str, root: Path | str | None = None) -> DemosInfo:
         terms=_shared([e.terms for e in episodes]),
         infos=_shared([e.infos for e in episodes]),
         seeds=tuple(e.seed for e in episodes),
-        size_bytes=sum(file.stat().st_size for file in data.rglob("*") if file.is_file()),
-        algorithm=metadata.get("algorithm_name"),
-        author=", ".join(sorted(metadata.get("author", ()))) or None,
-        description=metadata.get("description"),
-        random_return=metadata.get("ref_min_score"),
-        expert_return=metadata.get("ref_max_score"),
+        size_bytes=sum(file.stat().st_size for file in dataset.path.rglob("*") if file.is_file()),
+        algorithm=dataset.algorithm,
+        author=dataset.author,
+        description=dataset.description,
+        random_return=dataset.random_return,
+        expert_return=dataset.expert_return,
     )
 
 

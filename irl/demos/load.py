@@ -6,12 +6,17 @@ from pathlib import Path
 from typing import overload
 
 import gymnasium as gym
+import numpy as np
+from gymnasium.spaces import Box
 
 from irl.core.errors import UserError
 from irl.core.rng import stream
 from irl.core.types import Episode
-from irl.demos.storage import env_id_of, open_dataset, read_episodes
+from irl.demos.storage import open_dataset, read_episodes
 from irl.envs.tasks import task_of
+
+FLOAT32_UNITS = 8
+"""How far beyond a bound an action may lie, in float32's units of the bound's last place."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,37 +70,36 @@ def load_demos(
         UserError: the dataset is not there or cannot be read, or has fewer episodes.
     """
     dataset = open_dataset(dataset_id, root)
-    n = dataset.total_episodes if episodes is None else episodes
-    if n < 1 or n > dataset.total_episodes:
+    n = dataset.episodes if episodes is None else episodes
+    if n < 1 or n > dataset.episodes:
         raise UserError(
-            f"{n} demonstration episodes asked for, {dataset_id} has {dataset.total_episodes}; expected "
-            f"1 to {dataset.total_episodes}"
+            f"{n} demonstration episodes asked for, {dataset_id} has {dataset.episodes}; expected "
+            f"1 to {dataset.episodes}"
         )
-    drawn = stream(seed, "demos").permutation(dataset.total_episodes)
+    every = read_episodes(dataset, root)
+    drawn = stream(seed, "demos").permutation(len(every))
     chosen, rest = sorted(drawn[:n].tolist()), sorted(drawn[n:].tolist())
-    every = read_episodes(dataset)
-    metadata = dataset.storage.metadata
     return Demos(
         episodes=tuple(every[i] for i in chosen),
         held_out=tuple(every[i] for i in rest),
         indices=tuple(chosen),
         held_out_indices=tuple(rest),
         dataset_id=dataset_id,
-        env_id=env_id_of(dataset),
-        path=Path(str(dataset.storage.data_path)).parent,
-        random_return=metadata.get("ref_min_score"),
-        expert_return=metadata.get("ref_max_score"),
+        env_id=dataset.env_id,
+        path=dataset.path,
+        random_return=dataset.random_return,
+        expert_return=dataset.expert_return,
     )
 
 
 def check_task(demos: Demos, env: gym.Env) -> None:
-    """Refuse demonstrations of another task than `env`'s.
+    """Refuse demonstrations of another task than `env`'s, and actions that it would not take.
 
     Other shapes are always refused; equal ones where both tasks are known and differ, as Walker2d and
     HalfCheetah.
 
     Raises:
-        UserError: names both tasks and their shapes.
+        UserError: names both tasks and their shapes; or the episode, the step, the action and its bounds.
     """
     shown = demos.env_id or demos.dataset_id
     wanted = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
@@ -111,3 +115,21 @@ def check_task(demos: Demos, env: gym.Env) -> None:
             f"demonstrations of {shown} are not of {wanted}, though both have observations of {has[0]} and "
             f"actions of {has[1]}"
         )
+    _check_actions(demos, wanted, env.action_space)
+
+
+def _check_actions(demos: Demos, wanted: str, space: gym.Space) -> None:
+    assert isinstance(space, Box)
+    low, high = space.low.astype(np.float64), space.high.astype(np.float64)
+    # a bound as float32 is off by half a unit in the last place, an action scaled to it by a few
+    slack = FLOAT32_UNITS * np.finfo(np.float32).eps * np.maximum(np.abs(low), np.abs(high))
+    indices = (*demos.indices, *demos.held_out_indices)
+    for index, episode in zip(indices, (*demos.episodes, *demos.held_out), strict=True):
+        outside = (episode.action < low - slack) | (episode.action > high + slack)
+        if outside.any():
+            step, column = (int(i) for i in np.argwhere(outside)[0])
+            raise UserError(
+                f"demonstrations {demos.dataset_id}: episode {index} has the action "
+                f"{float(episode.action[step, column])!r} in column {column} at step {step}; {wanted} takes "
+                f"{low[column]:g} to {high[column]:g}; record actions as the environment gets them, clipped"
+            )

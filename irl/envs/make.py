@@ -1,7 +1,9 @@
 """An environment by its id; what cannot be used is refused with one line that says what to type instead."""
 
 import difflib
+import os
 import re
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +16,15 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
 
 from irl.core.errors import UserError
+from irl.envs.guard import Guarded
+
+VARIABLE = "IRL_ENV_MODULES"
+"""Environment variable that names the modules which a file may have imported."""
+
+_FLAT = {
+    "observations": "e.g. of shape (11,); gymnasium.wrappers.FlattenObservation makes one of many spaces",
+    "actions": "e.g. of shape (3,)",
+}
 
 LIST_HINT = "; `python -c 'import gymnasium; gymnasium.pprint_registry()'` lists those there are"
 
@@ -36,14 +47,39 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
             if env_id not in gym.registry and ":" not in env_id:
                 raise UserError(f"there is no environment {env_id!r}{_near(env_id) or LIST_HINT}")
             env = gym.make(env_id, **kwargs)
-        except (gym.error.Error, ImportError, TypeError) as error:
-            raise UserError(f"cannot make {env_id!r}: {_one_line(error)}{_near(env_id)}") from error
+        except UserError:
+            raise
+        # whatever the environment's own code raises, it cannot be made
+        except Exception as error:
+            what = (
+                "" if isinstance(error, gym.error.Error | ImportError | TypeError) else type(error).__name__
+            )
+            said = ": ".join(filter(None, (what, _one_line(error))))
+            raise UserError(f"cannot make {env_id!r}: {said}{_near(env_id)}") from error
     try:
         _check_spaces(env_id, env)
     except UserError:
         env.close()
         raise
-    return env
+    return Guarded(env, env_id)
+
+
+def check_module(env_id: str, where: str) -> None:
+    """Refuse an id that was read from a file and would import a module: a file may be somebody else's.
+
+    What is typed is the user's own, and so are the modules that are imported already or named in
+    the environment variable IRL_ENV_MODULES (their names, with commas).
+
+    Raises:
+        UserError: says how to allow it.
+    """
+    module, colon, _ = env_id.rpartition(":")
+    allowed = os.environ.get(VARIABLE, "").split(",")
+    if colon and module not in allowed and module not in sys.modules:
+        raise UserError(
+            f"{where} names the environment {env_id!r}, which would import the module {module!r}; if you "
+            f"trust it, allow it: {VARIABLE}={module}"
+        )
 
 
 def near_ids(env_id: str, n: int = 3) -> list[str]:
@@ -92,9 +128,20 @@ def _one_line(error: BaseException) -> str:
 
 def _check_spaces(env_id: str, env: gym.Env) -> None:
     obs, action = env.observation_space, env.action_space
-    if not isinstance(obs, Box) or len(obs.shape) != 1:
-        raise UserError(f"{env_id} has the observations {obs}; expected a flat Box, e.g. Box of shape (11,)")
-    if not isinstance(action, Box) or len(action.shape) != 1:
-        raise UserError(f"{env_id} has the actions {action}; expected a flat Box, e.g. Box of shape (3,)")
-    if not (np.issubdtype(action.dtype, np.floating) and action.is_bounded()):
+    check_flat(env_id, "observations", obs)
+    check_flat(env_id, "actions", action)
+    if not (isinstance(action, Box) and action.is_bounded()):
         raise UserError(f"{env_id} has the actions {action}; expected real numbers with finite bounds")
+
+
+def check_flat(owner: str, what: str, space: gym.Space) -> None:
+    """Refuse a space that is not a flat Box of real numbers: Dict, Tuple, images, discrete ones.
+
+    Raises:
+        UserError: names `owner` and the space.
+    """
+    if not isinstance(space, Box) or len(space.shape) != 1 or not np.issubdtype(space.dtype, np.floating):
+        shown = " ".join(str(space).split())
+        raise UserError(
+            f"{owner} has the {what} {shown:.120}; expected a flat Box of real numbers, {_FLAT[what]}"
+        )

@@ -1,6 +1,7 @@
 """The command line: one table of commands, each a frozen dataclass that tyro reads."""
 
 import contextlib
+import errno
 import io
 import sys
 from collections.abc import Callable, Sequence
@@ -28,6 +29,11 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("experts", "list"): (experts.ListExperts, experts.list_experts),
 }
 
+_FULL = "; free some space, or choose a folder on another disk"
+_CLOSED = "; choose a folder that you may write to"
+HINTS = dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _FULL)
+HINTS |= dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _CLOSED)
+
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Run one command; a user's mistake is one line on stderr and exit status 2."""
@@ -39,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     except (UserError, OSError) as error:
         if debug:
             raise
-        _fail(str(error))
+        _fail(_of_system(error) if isinstance(error, OSError) else str(error))
     except (Interrupted, KeyboardInterrupt):
         raise SystemExit(130) from None
 
@@ -78,6 +84,14 @@ def _overview(words: list[str]) -> None:
         console.print(f"  irl {' '.join(name):<18} {first}", highlight=False)
 
 
+def _of_system(error: OSError) -> str:
+    """What the system said, of which file, and what may be done about it."""
+    said = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+    return said + HINTS.get(error.errno or 0, "")
+
+
 def _fail(message: str) -> None:
-    print(f"irl: {' '.join(message.split())}", file=sys.stderr)
+    # a name out of a file may hold what a terminal obeys
+    line = "".join(c if c.isprintable() else "?" for c in " ".join(message.split()))
+    print(f"irl: {line}", file=sys.stderr)
     raise SystemExit(2)

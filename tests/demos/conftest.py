@@ -1,13 +1,16 @@
 """A small dataset, in a root of its own."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from irl.core.rng import stream
 from irl.demos.generate import generate
 from irl.demos.info import DemosInfo
+from irl.demos.storage import DIGEST
 from irl.envs.make import make
 from irl.envs.rollouts import random_act
 
@@ -40,3 +43,10 @@ def make_hopper(tmp_path: Path) -> Generate:
         return generate("Hopper-v5", act, **(arguments | changes))
 
     return run
+
+
+def foreign(data: Path, **changes: Any) -> None:
+    """Make the dataset in `data` one of another recorder, who leaves no digest; then change its metadata."""
+    content = json.loads((data / "metadata.json").read_text()) | changes
+    content.pop(DIGEST, None)
+    (data / "metadata.json").write_text(json.dumps(content))

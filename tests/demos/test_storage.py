@@ -9,6 +9,7 @@ import pytest
 from irl.core.errors import UserError
 from irl.demos.load import load_demos
 from irl.demos.storage import generate_command, list_datasets
+from tests.demos.conftest import foreign
 
 
 def test_list(make_hopper, tmp_path):
@@ -60,7 +61,9 @@ def test_damaged_files(make_hopper, tmp_path):
 
     with h5py.File(path / "main_data.hdf5", "a") as file:
         del file["episode_3/actions"]
-    refused("irl/hopper/random-v0 in .* cannot be read: .*actions")
+    refused("cannot be read: main_data.hdf5 has sha256 .* take irl_data_sha256 out of metadata.json")
+    foreign(path)
+    refused("irl/hopper/random-v0 in .* cannot be read: .*actions.*; make it again with .* --overwrite`$")
     content = (path / "main_data.hdf5").read_bytes()
     (path / "main_data.hdf5").write_bytes(content[: len(content) // 2])
     refused("cannot be read")
@@ -85,6 +88,7 @@ def test_spaces_that_are_not_flat_boxes(make_hopper, tmp_path):
 def test_infos_of_other_recorders(make_hopper, tmp_path):
     """Without the row of the reset, with vectors, with text, and with a term missing."""
     path = make_hopper().path / "data" / "main_data.hdf5"
+    foreign(path.parent)
     with h5py.File(path, "a") as file:
         infos = file["episode_0/infos"]
         assert isinstance(infos, h5py.Group)
@@ -110,6 +114,7 @@ def test_infos_of_other_recorders(make_hopper, tmp_path):
 
 def test_an_episode_cut_off_by_the_recording(make_hopper, tmp_path):
     path = make_hopper().path / "data" / "main_data.hdf5"
+    foreign(path.parent)
     with h5py.File(path, "a") as file:
         file["episode_0/terminations"][...] = False  # pyright: ignore[reportIndexIssue]
     demos = load_demos("irl/hopper/random-v0", root=tmp_path)
