@@ -31,15 +31,22 @@ class RunFolder:
         return files.read_json(self.path / "config.json")
 
     def metrics(self) -> list[dict[str, Any]]:
-        """Every complete line of `metrics.jsonl`; a last line that was cut off is not one."""
+        """Every complete line of `metrics.jsonl`; a last line that was cut off is not one.
+
+        Raises:
+            UserError: another line is damaged; named by its number.
+        """
         path = self.path / "metrics.jsonl"
-        rows = []
-        for line in path.read_text().splitlines() if path.is_file() else []:
-            try:
-                rows.append(json.loads(line))
-            except json.JSONDecodeError:
-                break
-        return rows
+        lines = path.read_bytes().splitlines() if path.is_file() else []
+        rows = [_row(line) for line in lines]
+        if rows and rows[-1] is None:
+            rows.pop()
+        if None in rows:
+            raise UserError(
+                f"line {rows.index(None) + 1} of {path} is not one that a run writes; take the line out, or "
+                f"begin a new run with --config and --out"
+            )
+        return [row for row in rows if row is not None]
 
     def append(self, row: Mapping[str, int | float | None]) -> None:
         """Add a line to `metrics.jsonl`; a number that is not finite is written as null.
@@ -138,6 +145,15 @@ def snapshot_steps(total: int, halvings: int = 6) -> list[int]:
     logarithmic = {total // 2**k for k in range(halvings + 1)}
     quarters = {total * k // 4 for k in range(5)}
     return sorted(logarithmic | quarters)
+
+
+def _row(line: bytes) -> dict[str, Any] | None:
+    """The numbers of a line of `metrics.jsonl`, None where it is none."""
+    try:
+        row = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    return row if isinstance(row, dict) and isinstance(row.get("round"), int) else None
 
 
 def _by_steps(root: Path) -> dict[int, Path]:

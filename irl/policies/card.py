@@ -13,7 +13,7 @@ from irl.core.config import from_json
 from irl.core.errors import UserError
 from irl.core.rng import episode_seeds, stream
 from irl.core.types import ActFn, Episode
-from irl.envs.make import make
+from irl.envs.make import check_module, make
 from irl.envs.rollouts import random_act, rollouts
 
 
@@ -98,7 +98,15 @@ def normalised_score(value: float, random: float | None, expert: float | None) -
 
 
 def write_card(card: Card, path: Path) -> None:
-    """Write `card.json`."""
+    """Write `card.json`.
+
+    Raises:
+        UserError: a return is not a finite number; a score could not be computed from the card.
+    """
+    if not np.isfinite([*card.measured.returns, card.random_return_mean]).all():
+        raise UserError(
+            f"{card.env_id} pays a reward that is not a finite number; a card needs finite returns"
+        )
     content = asdict(card)
     files.write_json(path, content | content.pop("measured"))
 
@@ -107,7 +115,8 @@ def read_card(path: Path) -> Card:
     """The card in a file.
 
     Raises:
-        UserError: it is missing, damaged, or lacks a field.
+        UserError: it is missing, damaged, lacks a field, or names an environment whose module is not
+            to be imported on a file's word.
     """
     content = files.read_json(path)
     measured = {field.name for field in fields(Measurement)}
@@ -116,4 +125,6 @@ def read_card(path: Path) -> Card:
         raise UserError(f"{path} is not a policy card: it lacks {', '.join(missing)}")
     named = {name: content[name] for name in others}
     named["measured"] = {name: content[name] for name in measured}
-    return from_json(Card, named, str(path))
+    card = from_json(Card, named, str(path))
+    check_module(card.env_id, str(path))
+    return card

@@ -13,12 +13,14 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 from jaxtyping import Float
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from irl.core import files
+from irl.core.config import from_json
 from irl.core.errors import UserError
 from irl.core.nets import CLIP
 
@@ -144,7 +146,47 @@ def load_policy(path: Path | str) -> Policy:
             raise ValueError(
                 f"expected format {FORMAT} {VERSION}, found {header.get('format')} {header.get('version')}"
             )
-        spec = header["spec"]
-        return Policy(PolicySpec(**spec | {"hidden": tuple(spec["hidden"])}), weights)
-    except (SafetensorError, AttributeError, KeyError, TypeError, ValueError) as error:
+        _check_values(weights)
+        return Policy(from_json(PolicySpec, header["spec"], "spec"), weights)
+    # AttributeError: a header that is no object, and numpy's lack of some types; RecursionError: a deep one
+    except (SafetensorError, OSError, LookupError, TypeError, ValueError, AttributeError) as error:
         raise UserError(f"{path} is not a policy this version reads: {error}") from error
+    except (RecursionError, MemoryError) as error:
+        raise UserError(f"{path} is not a policy this version reads: {type(error).__name__}") from error
+
+
+def check_policy(policy: Policy, env: gym.Env) -> None:
+    """Refuse a policy of another task than `env`'s.
+
+    Raises:
+        UserError: its observations or actions are of other sizes.
+    """
+    wanted = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
+    has = policy.spec.obs_dim, policy.spec.action_dim
+    needs = (env.observation_space.shape or (0,))[0], (env.action_space.shape or (0,))[0]
+    if has != needs:
+        raise UserError(
+            f"the policy of {policy.spec.env_id} takes observations of {has[0]} and gives actions of "
+            f"{has[1]}; {wanted} has {needs[0]} and {needs[1]}: choose a policy of this task"
+        )
+
+
+def _check_values(weights: dict[str, np.ndarray]) -> None:
+    """Refuse numbers that no training writes.
+
+    Raises:
+        ValueError: names the weights, and what is wrong with them.
+    """
+    for name, values in weights.items():
+        if values.dtype.kind != "f":
+            raise ValueError(f"{name} is of {values.dtype}; expected real numbers")
+        with np.errstate(over="ignore"):
+            finite = np.isfinite(values.astype(np.float32)).all()
+        if not finite:
+            raise ValueError(f"{name} has values that are not finite")
+    if "obs_std" in weights and (weights["obs_std"] <= 0.0).any():
+        raise ValueError("obs_std has values that are not positive")
+    if {"action_low", "action_high"} <= weights.keys():
+        low, high = weights["action_low"], weights["action_high"]
+        if low.shape == high.shape and (low > high).any():
+            raise ValueError("action_low is above action_high")

@@ -5,6 +5,7 @@ expert_data/policies, the policies inside the installed package, ./expert_data/p
 """
 
 import os
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -43,12 +44,23 @@ def writable_root(root: Path | None = None) -> Path:
     return next(folder for folder in roots(root) if folder != inside)
 
 
+def check_level(level: str) -> None:
+    """Refuse what is not the name of one folder.
+
+    Raises:
+        UserError: it could lead elsewhere, as ../x would.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", level):
+        raise UserError(f"{level!r:.80} is not a level; expected letters, digits, _ and -, e.g. expert")
+
+
 def find(env_id: str, level: str = "expert", root: Path | None = None) -> Shelved:
     """The policy of a task.
 
     Raises:
         UserError: there is none, or its weights are not the ones its card was made for.
     """
+    check_level(level)
     for folder in roots(root):
         path = folder / task_name(env_id) / level
         if (path / CARD).is_file():
@@ -87,4 +99,10 @@ def _load(path: Path, card: Card) -> Shelved:
             f"{card.weights_sha256[:12]}); restore it or train again with: "
             f"irl experts train --env-id {card.env_id} --overwrite"
         )
-    return Shelved(load_policy(path / POLICY), card, path)
+    policy = load_policy(path / POLICY)
+    if policy.spec.env_id != card.env_id:
+        raise UserError(
+            f"{path / POLICY} is a policy of {policy.spec.env_id}, its card says {card.env_id}; "
+            f"train again with: irl experts train --env-id {card.env_id} --overwrite"
+        )
+    return Shelved(policy, card, path)

@@ -6,6 +6,7 @@ It takes task observations and environment-unit actions, and gives the reward be
 learner did (`reward_scale` in the specification records that). No pickle is read.
 """
 
+import itertools
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -106,11 +107,31 @@ def load_reward(path: Path | str) -> LearnedReward:
         spec = from_json(RewardSpec, content, SPEC)
         if spec.reward_map not in MAPS:
             raise ValueError(f"unknown map {spec.reward_map!r}; known: {', '.join(MAPS)}")
+        weights = load((folder / WEIGHTS).read_bytes())
+        _check_weights(spec.net, weights)
         net = LogitNet(spec.net, Normaliser(spec.net.obs_dim), torch.Generator())
-        net.load_state_dict(load((folder / WEIGHTS).read_bytes()))
+        net.load_state_dict(weights)
     except (OSError, SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
         raise UserError(f"{folder} is not a reward this version reads: {json.dumps(str(error))}") from error
     return LearnedReward(spec, net)
+
+
+def _check_weights(spec: LogitSpec, weights: dict[str, Tensor]) -> None:
+    """Refuse weights that are not finite, and a specification of more than there are.
+
+    Raises:
+        ValueError: named, before memory is asked for on the specification's word.
+    """
+    for name, values in weights.items():
+        if not (values.is_floating_point() and torch.isfinite(values).all()):
+            raise ValueError(f"{name} has values that are not finite numbers")
+    sizes = (spec.obs_dim + spec.action_dim, *spec.hidden, 1)
+    claimed = sum(inputs * outputs for inputs, outputs in itertools.pairwise(sizes))
+    held = sum(values.numel() for values in weights.values())
+    if min(spec.obs_dim, spec.action_dim, *spec.hidden) < 1 or claimed > max(held, 10**6):
+        raise ValueError(
+            f"{SPEC} says {sizes} units a layer, which the {held} numbers of {WEIGHTS} do not fit"
+        )
 
 
 def _reward_folder(path: Path) -> Path:
