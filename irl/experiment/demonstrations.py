@@ -6,6 +6,7 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from irl.core.config import check_at_least, check_seed
 from irl.core.errors import UserError
@@ -19,6 +20,7 @@ from irl.envs.tasks import task_name
 from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 from irl.policies.card import Card
+from irl.policies.policy import check_policy
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,7 @@ class GenerateDemos:
     def __post_init__(self) -> None:
         check_at_least(self, 1, "episodes")
         check_seed(self.seed)
+        shelf.check_level(self.level)
 
 
 @dataclass(frozen=True)
@@ -67,8 +70,12 @@ class ListDemos:
 
 def generate_demos(command: GenerateDemos) -> None:
     """Record the episodes and describe the dataset."""
-    make(command.env_id).close()
-    expert = shelf.find(command.env_id, command.level, command.policies_root)
+    env = make(command.env_id)
+    try:
+        expert = shelf.find(command.env_id, command.level, command.policies_root)
+        check_policy(expert.policy, env)
+    finally:
+        env.close()
     dataset_id = command.dataset_id or f"irl/{task_name(command.env_id)}/{command.level}-v0"
     with progress(dataset_id, command.episodes) as report:
         info = generate(
@@ -123,7 +130,8 @@ def _table(info: DemosInfo) -> Table:
         "folder": str(info.path),
     }
     for name, value in rows.items():
-        table.add_row(name, value)
+        # as text: what a file says is not markup
+        table.add_row(name, Text(value))
     return table
 
 

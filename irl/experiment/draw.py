@@ -7,7 +7,7 @@ from irl.core import files
 from irl.core.errors import UserError
 from irl.core.records import RunFolder
 from irl.demos.load import Demos, check_task, load_demos
-from irl.envs.make import make
+from irl.envs.make import check_module, make
 from irl.experiment.configs import GAILRun
 
 RECORD = "demonstrations.json"
@@ -17,13 +17,19 @@ def draw(config: GAILRun) -> Demos:
     """The demonstrations that the settings name.
 
     Raises:
-        UserError: there are none, too few, or they are of another task.
+        UserError: there are none, too few, or they are of another task; or the task cannot be started.
     """
+    return _drawn_of(config, config.datasets_root)
+
+
+def _drawn_of(config: GAILRun, root: Path | None) -> Demos:
+    """The demonstrations, once they are known to be of the task and the task is known to start."""
     env = make(config.env_id)
     try:
-        wanted, root = config.demo_episodes, config.datasets_root
-        demos = load_demos(config.demos, episodes=wanted, seed=config.seed, root=root)
+        demos = load_demos(config.demos, episodes=config.demo_episodes, seed=config.seed, root=root)
         check_task(demos, env)
+        env.reset(seed=config.seed)
+        env.step(demos[0].action[0].astype(env.action_space.dtype))
         return demos
     finally:
         env.close()
@@ -44,13 +50,19 @@ def drawn_again(config: GAILRun, folder: RunFolder, root: Path | None = None) ->
     """The demonstrations that the run in `folder` was begun with.
 
     Raises:
-        UserError: the dataset is another one now.
+        UserError: the dataset is another one now, or the task cannot be started.
     """
-    where = root or config.datasets_root
-    demos = load_demos(config.demos, episodes=config.demo_episodes, seed=config.seed, root=where)
-    if drawn(demos) != files.read_json(folder.path / RECORD):
+    check_module(config.env_id, str(folder.path / "config.json"))
+    if not (record := folder.path / RECORD).is_file():
         raise UserError(
-            f"{config.demos} in {demos.path} is not the dataset that {folder.path} was begun with; "
+            f"no file {record}, which says what the run learned from; train again with: irl train --config "
+            f"{folder.path / 'config.json'} --out FOLDER"
+        )
+    before = files.read_json(record)
+    demos = _drawn_of(config, root or config.datasets_root)
+    if drawn(demos) != before:
+        raise UserError(
+            f"{config.demos} in {demos.path} is not the dataset of {record}, which the run was begun with; "
             f"name the folder that holds it with --datasets-root, or set MINARI_DATASETS_PATH"
         )
     return demos

@@ -1,6 +1,6 @@
 """`irl evaluate`: the policy and the reward of a run in numbers, and one page to look at."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from irl.core.errors import UserError
 from irl.core.rng import episode_seeds
 from irl.core.types import Episode
 from irl.demos.load import Demos
+from irl.envs.make import make
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import GAILRun
 from irl.experiment.draw import drawn_again
@@ -24,10 +25,10 @@ from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 from irl.policies.card import Card, normalised_score, summary
-from irl.policies.policy import load_policy
+from irl.policies.policy import Policy, check_policy, load_policy
 from irl.report.html import write_report
 from irl.report.tables import evaluation_table
-from irl.rewards.artefact import load_reward
+from irl.rewards.artefact import LearnedReward, load_reward
 
 NO_RETURN = "the task's own reward is not a finite number"
 
@@ -60,25 +61,30 @@ def evaluate(command: Evaluate) -> None:
     report = write_report(folder.path)
     console = Console()
     console.print(evaluation_table(result))
-    console.print(f"report: {report}", highlight=False, soft_wrap=True)
+    console.print(f"report: {report}", highlight=False, markup=False, soft_wrap=True)
 
 
 def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     """The content of `evaluation.json`."""
     config = from_json(GAILRun, folder.config, str(folder.path / "config.json"))
     if not (snapshots := folder.snapshots()):
-        raise UserError(f"{folder.path} has no snapshot yet; go on with: irl train --resume {folder.path}")
+        raise UserError(
+            f"{folder.path} has no snapshot; go on with: irl train --resume {folder.path}, or where it is "
+            f"finished, train again with: irl train --config {folder.path / 'config.json'} --out FOLDER"
+        )
     torch.set_num_threads(config.threads)
-    steps, last = list(snapshots.items())[-1]
     root = command.datasets_root or config.datasets_root
     demos = drawn_again(config, folder, root)
-    episodes = _play(config.env_id, last, command)
+    references = _references(config.env_id, demos, command.policies_root)
+    # everything is read before anything is played
+    policy, rewards = _read(config.env_id, snapshots)
+    episodes = _play(config.env_id, policy, command)
     expert = demos.held_out or demos.episodes
     judged = probe(expert, episodes, config.env_id, command.seed)
-    reward = judge_reward(load_reward(last), judged, command.seed)
+    steps = list(snapshots)[-1]
+    reward = judge_reward(rewards[steps], judged, command.seed)
     if not demos.held_out:
         reward["notes"].append("No demonstration is held out: the expert's steps are those trained on.")
-    references = _references(config.env_id, demos, command.policies_root)
     return {
         "format": "irl.evaluation",
         "version": 1,
@@ -89,14 +95,41 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "policy": _policy(episodes, references),
         "references": references,
         "reward": reward,
-        "drift": judge_drift(snapshots, judged),
+        "drift": judge_drift(rewards, judged),
     }
 
 
-def _play(env_id: str, snapshot: Path, command: Evaluate) -> list[Episode]:
+def _read(env_id: str, snapshots: Mapping[int, Path]) -> tuple[Policy, dict[int, LearnedReward]]:
+    """The policy of the last snapshot and the reward of each.
+
+    Raises:
+        UserError: a file is missing or damaged, or of another task.
+    """
+    policy = load_policy(list(snapshots.values())[-1] / "policy.safetensors")
+    rewards = {steps: load_reward(path) for steps, path in snapshots.items()}
+    env = make(env_id)
+    try:
+        check_policy(policy, env)
+        for steps, reward in rewards.items():
+            _check_reward(reward, env_id, policy, snapshots[steps])
+    finally:
+        env.close()
+    return policy, rewards
+
+
+def _check_reward(reward: LearnedReward, env_id: str, policy: Policy, path: Path) -> None:
+    takes = reward.spec.net.obs_dim, reward.spec.net.action_dim
+    if reward.spec.env_id != env_id or takes != (policy.spec.obs_dim, policy.spec.action_dim):
+        raise UserError(
+            f"the reward in {path} is of {reward.spec.env_id} with observations of {takes[0]} and actions of "
+            f"{takes[1]}; {env_id} has {policy.spec.obs_dim} and {policy.spec.action_dim}: take the snapshot "
+            f"away, or choose the run it belongs to"
+        )
+
+
+def _play(env_id: str, policy: Policy, command: Evaluate) -> list[Episode]:
     seeds = episode_seeds(command.seed, "evaluation", command.episodes)
     with progress("evaluating", command.episodes) as report:
-        policy = load_policy(snapshot / "policy.safetensors")
         return rollouts(env_id, policy, seeds, each_episode(report))
 
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from irl.core import statistics
 from irl.core.rng import stream
 from irl.diagnostics.agreement import per_episode, per_step
 from irl.diagnostics.drift import split
-from irl.rewards.artefact import LearnedReward, load_reward
+from irl.rewards.artefact import LearnedReward
 from irl.rewards.mujoco import HandWritten
 
 SCATTER = 3000
@@ -62,16 +61,13 @@ def judge_reward(reward: LearnedReward, probe: Probe, seed: int) -> dict[str, An
     }
 
 
-def judge_drift(snapshots: Mapping[int, Path], probe: Probe) -> dict[str, Any]:
+def judge_drift(rewards: Mapping[int, LearnedReward], probe: Probe) -> dict[str, Any]:
     """How the reward moved from snapshot to snapshot, read on the same steps every time.
 
     `path` is the sum so far of the root mean squared changes: how far it walked, whatever the way.
     """
-    readings = []
-    for path in snapshots.values():
-        reward = load_reward(path)
-        readings.append({name: read(reward, probe.steps[name]) for name in STRATA})
-    at = list(snapshots)
+    readings = [{name: read(reward, probe.steps[name]) for name in STRATA} for reward in rewards.values()]
+    at = list(rewards)
     changes, path = [], 0.0
     for i in range(1, len(at)):
         moved = split(probe.stacked(readings[i - 1]), probe.stacked(readings[i]))
