@@ -27,8 +27,15 @@ class RunFolder:
 
     @property
     def config(self) -> dict[str, Any]:
-        """What `config.json` holds."""
-        return files.read_json(self.path / "config.json")
+        """What `config.json` holds.
+
+        Raises:
+            UserError: it cannot be read, or holds no object.
+        """
+        content = files.read_json(path := self.path / "config.json")
+        if not isinstance(content, dict):
+            raise UserError(f"{path}: expected the settings of a run, found a {type(content).__name__}")
+        return content
 
     def metrics(self) -> list[dict[str, Any]]:
         """Every complete line of `metrics.jsonl`; a last line that was cut off is not one.

@@ -8,6 +8,7 @@ from typing import Literal
 import torch
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from irl.core import records
@@ -60,6 +61,7 @@ class TrainExpert:
     def __post_init__(self) -> None:
         check_at_least(self, 1, "threads")
         check_seed(self.seed)
+        shelf.check_level(self.level)
         if self.steps is not None:
             check_at_least(self, 1, "steps")
 
@@ -203,8 +205,9 @@ def _table(rows: list[tuple[Card, Measurement]]) -> Table:
         table.add_column(column, no_wrap=True)
     for card, m in rows:
         table.add_row(
-            card.env_id if card.level == "expert" else f"{card.env_id} {card.level}",
-            f"{card.algorithm} {card.steps / 1e6:.3g}M",
+            # escaped: what a card says is not markup
+            escape(card.env_id if card.level == "expert" else f"{card.env_id} {card.level}"),
+            escape(f"{card.algorithm} {card.steps / 1e6:.3g}M"),
             f"{m.return_mean:.1f} ± {m.return_std:.1f}",
             f"{m.return_min:.1f}",
             f"{m.length_mean:.0f} ({m.length_min})",

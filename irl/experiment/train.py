@@ -14,6 +14,7 @@ from irl.core.provenance import command_line, environment
 from irl.core.types import from_episodes
 from irl.demos.load import Demos
 from irl.discriminators.gail import GAIL
+from irl.envs.make import check_module
 from irl.experiment import build
 from irl.experiment.configs import GAILRun
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
@@ -57,6 +58,7 @@ def go_on(command: Resume) -> None:
         if command.out is None:
             raise UserError("--config repeats a run in a new folder: name it with --out FOLDER")
         config = from_json(GAILRun, files.read_json(command.config), str(command.config))
+        check_module(config.env_id, str(command.config))
         return train_gail(replace(config, out=command.out))
     assert command.resume is not None
     if command.out is not None:
