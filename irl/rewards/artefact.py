@@ -3,7 +3,10 @@
     r(s, a) = map(logit(s, a)),   logit(s, a) = mlp([clip((s - mean) / std, +-10), a])
 
 It takes task observations and environment-unit actions, and gives the reward before any scaling that a
-learner did (`reward_scale` in the specification records that). No pickle is read.
+learner did (`reward_scale` in the specification records that). One that knows the absorbing state adds the
+indicator itself, and what that state pays at a termination (`irl.rewards.tail`). No pickle is read.
+
+Version 1 had no absorbing state and no spectral norm; it is read as one with neither.
 """
 
 import itertools
@@ -23,11 +26,15 @@ from irl.core.config import from_json
 from irl.core.errors import UserError
 from irl.core.nets import Normaliser
 from irl.core.types import Transitions
+from irl.rewards import tail
 from irl.rewards.maps import MAPS
 from irl.rewards.nets import LogitNet, LogitSpec
 
-FORMAT, VERSION = "irl.reward", 1
+FORMAT, VERSION = "irl.reward", 2
+READABLE = [(FORMAT, 1), (FORMAT, VERSION)]
 SPEC, WEIGHTS = "spec.json", "weights.safetensors"
+ADDED_IN_2 = {"absorbing_scale": 0.0, "spectral_norm": False}
+"""Settings of the network that version 1 did not have."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class RewardSpec:
     """What the network sees: `obs, action`."""
     net: LogitSpec
     gamma: float
-    """The discount of the learner it was learned beside."""
+    """The discount of the learner it was learned beside, and of what the absorbing state pays."""
     reward_scale: float
     """What that learner divided it by at this step."""
     env_steps: int
@@ -67,17 +74,21 @@ class LearnedReward:
         Raises:
             ValueError: the batch is of another task.
         """
+        self._check(batch)
+        return self.net(batch)
+
+    def __call__(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """The reward of each step; high is good. At a termination, with what the absorbing state pays."""
+        self._check(batch)
+        return tail.reward(self.net, self.spec.reward_map, batch, self.spec.gamma)
+
+    def _check(self, batch: Transitions) -> None:
         given, expected = (batch.obs.shape[1], batch.action.shape[1]), self.spec.net
         if given != (expected.obs_dim, expected.action_dim):
             raise ValueError(
                 f"the reward of {self.spec.env_id} takes observations of {expected.obs_dim} and actions of "
                 f"{expected.action_dim}, the batch has {given[0]} and {given[1]}"
             )
-        return self.net(batch)
-
-    def __call__(self, batch: Transitions) -> Float[Tensor, "B"]:
-        """The reward of each step; high is good."""
-        return MAPS[self.spec.reward_map](self.logits(batch))
 
 
 def save_reward(folder: Path, spec: RewardSpec, net: LogitNet) -> None:
@@ -100,10 +111,12 @@ def load_reward(path: Path | str) -> LearnedReward:
     try:
         if not isinstance(content, dict):
             raise TypeError(f"expected an object in {SPEC}, found {content!r:.80}")
-        if (content.pop("format"), version := content.pop("version")) != (FORMAT, VERSION):
-            raise ValueError(f"expected format {FORMAT} {VERSION}, found version {version}")
+        if (name := content.pop("format"), version := content.pop("version")) not in READABLE:
+            raise ValueError(f"expected format {FORMAT} 1 to {VERSION}, found {name!r:.40} {version!r:.10}")
         if (digest := files.sha256(folder / WEIGHTS)) != (named := content.pop("weights_sha256")):
             raise ValueError(f"{WEIGHTS} has sha256 {digest[:12]}, {SPEC} says {named!r:.14}")
+        if version == 1 and isinstance(content.get("net"), dict):
+            content["net"] = ADDED_IN_2 | content["net"]
         spec = from_json(RewardSpec, content, SPEC)
         if spec.reward_map not in MAPS:
             raise ValueError(f"unknown map {spec.reward_map!r}; known: {', '.join(MAPS)}")
@@ -125,7 +138,7 @@ def _check_weights(spec: LogitSpec, weights: dict[str, Tensor]) -> None:
     for name, values in weights.items():
         if not (values.is_floating_point() and torch.isfinite(values).all()):
             raise ValueError(f"{name} has values that are not finite numbers")
-    sizes = (spec.obs_dim + spec.action_dim, *spec.hidden, 1)
+    sizes = (spec.inputs, *spec.hidden, 1)
     claimed = sum(inputs * outputs for inputs, outputs in itertools.pairwise(sizes))
     held = sum(values.numel() for values in weights.values())
     if min(spec.obs_dim, spec.action_dim, *spec.hidden) < 1 or claimed > max(held, 10**6):

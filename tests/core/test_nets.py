@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from torch import nn
 
-from irl.core.nets import CLIP, Normaliser, fitted_normaliser, linear, mlp
+from irl.core.nets import CLIP, Normaliser, SpectralLinear, fitted_normaliser, linear, mlp
 from irl.core.rng import torch_stream
 
 columns = arrays(
@@ -121,3 +121,64 @@ def test_the_moments_travel_in_the_state() -> None:
     other.update(more)
     assert torch.equal(other.mean, fitted.mean)
     assert torch.equal(other.var, fitted.var)
+
+
+def spectral(inputs: int = 6, outputs: int = 4, seed: int = 0) -> SpectralLinear:
+    return SpectralLinear(inputs, outputs, torch_stream(seed, "net"))
+
+
+@pytest.mark.parametrize(("inputs", "outputs"), [(6, 4), (4, 6), (5, 1), (1, 5)])
+def test_a_spectral_layer_is_divided_by_its_largest_singular_value(inputs: int, outputs: int) -> None:
+    layer, x = spectral(inputs, outputs), torch.randn(7, inputs, generator=torch_stream(0, "x"))
+    expected = x @ (layer.weight / torch.linalg.matrix_norm(layer.weight, 2)).T + layer.bias
+    torch.testing.assert_close(layer(x), expected)
+
+
+def test_it_follows_the_weights_as_they_move_and_nothing_moves_otherwise() -> None:
+    layer, rng = spectral(), torch_stream(0, "steps")
+    for _ in range(200):
+        with torch.no_grad():
+            layer.weight += 0.005 * torch.randn(layer.weight.shape, generator=rng)
+        layer.iterate()
+    exact = torch.linalg.matrix_norm(layer.weight, 2)
+    estimate = layer.u @ layer.weight @ layer.v
+    assert 0.99 < float((estimate / exact).detach()) <= 1 + 1e-6
+    before = {name: value.clone() for name, value in layer.state_dict().items()}
+    for mode in (True, False):
+        layer.train(mode)(torch.ones(3, 6)).sum().backward()
+    assert all(torch.equal(value, before[name]) for name, value in layer.state_dict().items())
+
+
+def test_a_spectral_perceptron_lengthens_no_difference() -> None:
+    net = mlp((6, 8, 8, 1), "tanh", torch_stream(0, "net"), spectral_norm=True)
+    with torch.no_grad():
+        for layer in list(net)[::2]:
+            layer.get_parameter("weight").mul_(50.0)
+    a, b = (3 * torch.randn(100, 6, generator=torch_stream(0, name)) for name in "ab")
+    stretch = (net(a) - net(b)).norm(dim=1) / (a - b).norm(dim=1)
+    assert 0.01 < float(stretch.max().detach()) <= 1 + 1e-5
+
+
+def test_the_gradient_of_a_spectral_layer_is_that_of_the_exact_quotient() -> None:
+    layer = spectral().double()
+    x = torch.randn(7, 6, generator=torch_stream(0, "x"), dtype=torch.float64)
+    for _ in range(200):  # u and v to the last digit of float64
+        layer.iterate()
+    (found,) = torch.autograd.grad(layer(x).square().sum(), layer.weight)
+    quotient = layer.weight / torch.linalg.matrix_norm(layer.weight, 2)
+    (expected,) = torch.autograd.grad((x @ quotient.T + layer.bias).square().sum(), layer.weight)
+    torch.testing.assert_close(found, expected)
+
+
+def test_where_the_power_method_is_travels_in_the_state_and_draws_nothing_global() -> None:
+    before = torch.get_rng_state()
+    layer, other = spectral(), spectral(seed=1)
+    layer.iterate()
+    assert torch.equal(torch.get_rng_state(), before)
+    assert layer.state_dict().keys() == {"weight", "bias", "u", "v"}
+    other.load_state_dict(layer.state_dict())
+    x = torch.ones(2, 6)
+    assert torch.equal(other(x), layer(x))
+    for one in (layer, other):
+        one.iterate()
+    assert torch.equal(other.u, layer.u)

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import torch.nn.functional as F
 from torch import Tensor
 
 from irl.core import state
@@ -168,3 +169,21 @@ def test_it_goes_on_where_it_was_to_the_bit(tmp_path: Path) -> None:
     for _ in range(5):
         forgetful.update(expert, policy)
     assert not torch.equal(weights(forgetful), weights(d))
+
+
+def test_with_its_defaults_an_update_is_the_papers_loss_and_one_penalty_to_the_bit() -> None:
+    """The same steps written out: what later settings add must not move GAIL by a rounding."""
+    expert, policy = two_classes()
+    d, by_hand = discriminator(), discriminator()
+    rng, adam = torch_stream(0, "rest"), torch.optim.Adam(by_hand.net.parameters(), lr=SMALL.lr)
+    for _ in range(5):
+        d.update(expert, policy)
+        of, expert_x, policy_x = by_hand.net.of_inputs, by_hand.net.inputs(expert), by_hand.net.inputs(policy)
+        loss = F.softplus(-of(expert_x)).mean() + F.softplus(of(policy_x)).mean()
+        mix = torch.rand(64, 1, generator=rng)
+        x = (mix * expert_x + (1.0 - mix) * policy_x).requires_grad_(True)
+        (gradient,) = torch.autograd.grad(of(x).sum(), x, create_graph=True)
+        adam.zero_grad()
+        (loss + 5.0 * (gradient.norm(dim=1) - 1.0).square().mean()).backward()
+        adam.step()
+    assert torch.equal(weights(d), weights(by_hand))

@@ -126,3 +126,32 @@ def test_the_batches_get_no_gradient_and_the_global_stream_no_draw() -> None:
     gradient_penalty(lambda x: x.square().sum(1), expert, policy, torch_stream(0, "penalty"))
     assert torch.equal(torch.get_rng_state(), before)
     assert not expert.requires_grad
+
+
+@pytest.mark.parametrize("center", [0.0, 1.0, 2.5])
+def test_it_is_what_one_row_at_a_time_gives(center: float) -> None:
+    """The slow oracle: one share a row from the same stream, one gradient a row, of the logit."""
+    net = mlp((3, 8, 1), "tanh", torch_stream(0, "net"))
+    expert, policy = points(20, 3, 1.0), points(20, 3, -1.0)
+
+    def logit(x: Tensor) -> Tensor:
+        return 30 * net(x).squeeze(1)  # sure of itself: a sigmoid would be flat there
+
+    found = gradient_penalty(logit, expert, policy, torch_stream(0, "penalty"), center)
+    shares = torch.rand(20, 1, generator=torch_stream(0, "penalty"))
+    fines = []
+    for share, of_expert, of_policy in zip(shares, expert, policy, strict=True):
+        x = (share * of_expert + (1 - share) * of_policy).requires_grad_(True)
+        (gradient,) = torch.autograd.grad(logit(x[None]).sum(), x)
+        fines.append((float(gradient.norm()) - center) ** 2)
+    assert float(found.detach()) == pytest.approx(np.mean(fines), rel=1e-5)
+
+
+def test_centred_at_zero_a_flat_logit_is_free_and_its_gradient_finite() -> None:
+    weight = torch.zeros(2, requires_grad=True)
+    x = points(4, 2, 1.0)
+    penalty = gradient_penalty(lambda z: z @ weight, x, -x, torch_stream(0, "penalty"), 0.0)
+    penalty.backward()
+    assert float(penalty.detach()) == 0.0
+    assert weight.grad is not None
+    assert torch.isfinite(weight.grad).all()

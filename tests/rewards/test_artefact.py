@@ -14,8 +14,9 @@ from irl.core.errors import UserError
 from irl.core.nets import fitted_normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import RewardFn, Transitions
+from irl.envs.absorbing import absorb
 from irl.rewards.artefact import SPEC, WEIGHTS, RewardSpec, load_reward, save_reward
-from irl.rewards.maps import gail
+from irl.rewards.maps import MAPS, gail
 from irl.rewards.nets import LogitNet, LogitSpec
 
 REWARD = RewardSpec(
@@ -86,11 +87,55 @@ def test_it_takes_raw_observations_and_is_frozen(folder: Path) -> None:
 
 def test_the_specification_is_plain_json(folder: Path) -> None:
     content = json.loads((folder / SPEC).read_text())
-    assert (content["format"], content["version"]) == ("irl.reward", 1)
-    assert content["net"] == {"obs_dim": 3, "action_dim": 2, "hidden": [5, 4], "activation": "tanh"}
+    assert (content["format"], content["version"]) == ("irl.reward", 2)
+    assert content["net"] == {
+        "obs_dim": 3,
+        "action_dim": 2,
+        "hidden": [5, 4],
+        "activation": "tanh",
+        "absorbing_scale": 0.0,
+        "spectral_norm": False,
+    }
     assert content["provenance"] == REWARD.provenance
     assert content["weights_sha256"] == files.sha256(folder / WEIGHTS)
     assert sorted(path.name for path in folder.iterdir()) == [SPEC, WEIGHTS]
+
+
+def test_a_reward_of_version_1_is_read_as_it_was(folder: Path) -> None:
+    def as_version_1(content: dict[str, Any]) -> None:
+        content["version"] = 1
+        del content["net"]["absorbing_scale"], content["net"]["spectral_norm"]
+
+    now = load_reward(folder)
+    edit(folder, as_version_1)
+    before = load_reward(folder)
+    assert before.spec == now.spec
+    assert torch.equal(before(batch()), now(batch()))
+
+
+@pytest.mark.parametrize("reward_map", MAPS)
+def test_the_map_is_the_specifications(tmp_path: Path, reward_map: str) -> None:
+    save_reward(tmp_path, replace(REWARD, reward_map=reward_map), a_net())
+    reward = load_reward(tmp_path)
+    assert torch.equal(reward(batch()), MAPS[reward_map](reward.logits(batch())))
+
+
+def test_a_reward_that_knows_the_absorbing_state_comes_back_to_the_bit(tmp_path: Path) -> None:
+    shape = LogitSpec(3, 2, (5, 4), "relu", absorbing_scale=10.0, spectral_norm=True)
+    net = a_net(spec=shape)
+    spec = replace(REWARD, reward_map="logit", net=shape, gamma=0.9)
+    save_reward(tmp_path, spec, net)
+    reward, raw = load_reward(tmp_path), batch()
+    ended = replace(raw, terminated=torch.arange(20) % 7 == 6)
+    assert reward.spec == spec
+    with torch.no_grad():
+        expected = net(raw) + ended.terminated * 9.0 * net.of_absorbing()
+    # the tail is the artefact's: 0.9 / (1 - 0.9) = 9
+    torch.testing.assert_close(reward(ended), expected)
+    # with s_abs put in, nothing is added: its reward is there as rows
+    absorbed = absorb(ended)
+    assert torch.equal(reward(absorbed)[:20], reward(raw))
+    torch.testing.assert_close(reward(absorbed)[20:], net.of_absorbing().detach().expand(2))
 
 
 def test_a_snapshot_and_a_run_are_places_of_a_reward(tmp_path: Path) -> None:
@@ -113,8 +158,8 @@ def test_a_place_without_a_reward_is_refused(tmp_path: Path, below: str) -> None
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda c: c.update(version=2), "expected format irl.reward 1, found version 2"),
-        (lambda c: c.update(format="irl.policy"), "expected format irl.reward 1"),
+        (lambda c: c.update(version=3), "expected format irl.reward 1 to 2, found 'irl.reward' 3"),
+        (lambda c: c.update(format="irl.policy"), "expected format irl.reward 1 to 2, found 'irl.policy'"),
         (lambda c: c.update(reward_map="airy"), "unknown map 'airy'; known: gail"),
         (lambda c: c.update(extra=1), "spec.json: unknown extra; known: env_id"),
         (lambda c: c.pop("gamma"), "spec.json: missing gamma"),
@@ -123,6 +168,10 @@ def test_a_place_without_a_reward_is_refused(tmp_path: Path, below: str) -> None
         (lambda c: c.update(gamma="high"), "spec.json.gamma: expected float"),
         (lambda c: c["net"].update(extra=1), "spec.json.net: unknown extra"),
         (lambda c: c["net"].update(activation="gelu"), "gelu"),
+        (lambda c: c["net"].update(absorbing_scale=-1.0), "absorbing_scale must be at least 0"),
+        (lambda c: c["net"].update(absorbing_scale=10.0), "size mismatch"),
+        (lambda c: c["net"].update(spectral_norm=True), "Missing key"),
+        (lambda c: c["net"].pop("spectral_norm"), "spec.json.net: missing spectral_norm"),
         (lambda c: c["net"].update(hidden=[5, 5]), "size mismatch"),
         (lambda c: c["net"].update(obs_dim=4), "size mismatch"),
         (lambda c: c.update(net=[3, 2]), "spec.json.net: expected the settings of LogitSpec"),
@@ -162,7 +211,7 @@ def test_weights_of_another_network_are_refused(folder: Path) -> None:
     weights = load_file(folder / WEIGHTS)
     for name in weights:
         set_weights(folder, {other: weights[other] for other in weights if other != name})
-        with pytest.raises(UserError, match="Missing key"):
+        with pytest.raises(UserError, match=r"Missing key|do not fit"):
             load_reward(folder)
     set_weights(folder, weights | {"tail": torch.zeros(1)})
     with pytest.raises(UserError, match="tail"):

@@ -4,7 +4,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from irl.rewards.maps import MAPS, gail
+from irl.rewards.maps import FAIRL_MOST, MAPS, fairl, gail, log_d, logit
 
 logits = st.floats(-700, 1e6)
 
@@ -55,9 +55,61 @@ def test_a_blind_discriminator_pays_log_2() -> None:
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_every_map_increases_and_keeps_the_shape(name: str) -> None:
+def test_every_map_keeps_the_shape_and_all_but_fairl_increase(name: str) -> None:
     grid = torch.linspace(-8, 8, 50, dtype=torch.float64)
     reward = MAPS[name](grid)
     assert reward.shape == grid.shape
     assert reward.dtype == torch.float64
-    assert (reward.diff() > 0).all()
+    assert bool((reward.diff() > 0).all()) == (name != "fairl")
+
+
+@given(st.floats(-30, 30))
+def test_each_map_is_its_formula_of_d(h: float) -> None:
+    d, left = 1 / (1 + np.exp(-h)), 1 / (1 + np.exp(h))
+    found = {name: float(of(torch.tensor([h], dtype=torch.float64))) for name, of in MAPS.items()}
+    # label and sign: log D is the expert's, -log(1 - D) what is left to the policy
+    expected = {"gail": -np.log(left), "log_d": np.log(d), "logit": np.log(d) - np.log(left)}
+    # torch's softplus is the identity above 20
+    assert {name: found[name] for name in expected} == pytest.approx(expected, abs=1e-8, rel=1e-9)
+    assert found["fairl"] == pytest.approx(-h * np.exp(min(h, FAIRL_MOST)), rel=1e-12)
+
+
+@given(st.floats(-500, 500))
+def test_the_ranges_say_who_gains_by_an_early_end(h: float) -> None:
+    of_h = torch.tensor([h], dtype=torch.float64)
+    assert float(gail(of_h)) > 0 or h < -36
+    assert float(gail(of_h)) >= 0 >= float(log_d(of_h))
+    assert float(log_d(of_h)) < 0 or h > 36
+    assert float(logit(of_h)) == h
+    assert float(fairl(of_h)) <= np.exp(-1) + 1e-15
+
+
+def test_the_gail_reward_is_the_logit_and_the_fine_of_log_d() -> None:
+    grid = torch.linspace(-40, 40, 161, dtype=torch.float64)
+    torch.testing.assert_close(gail(grid) - logit(grid), -log_d(grid))
+    torch.testing.assert_close(gail(-grid), -log_d(grid))
+
+
+def test_fairl_peaks_where_the_policy_is_likelier_and_fines_where_the_expert_is() -> None:
+    grid = torch.linspace(-5, 5, 1001, dtype=torch.float64)
+    reward = fairl(grid)
+    assert float(grid[reward.argmax()]) == pytest.approx(-1.0)
+    assert float(reward.max()) == pytest.approx(np.exp(-1))
+    assert (reward[grid > 0] < 0).all()
+    assert (reward[grid < 0] > 0).all()
+
+
+@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_no_map_caps_or_loses_its_gradient_where_d_is_sure(name: str, dtype: torch.dtype) -> None:
+    # log(1 - sigmoid + 1e-8) would stop at 18.4, and its gradient with it
+    steep = {"gail": 50.0, "logit": 50.0, "log_d": -50.0, "fairl": 50.0}[name]
+    h = torch.tensor([steep], dtype=dtype, requires_grad=True)
+    reward = MAPS[name](h)
+    reward.sum().backward()
+    assert h.grad is not None
+    expected = {"gail": (50, 1), "logit": (50, 1), "log_d": (-50, 1)}
+    line = float(np.exp(FAIRL_MOST))
+    value, slope = expected.get(name, (-50 * line, -line))
+    assert reward.tolist() == pytest.approx([value], rel=1e-6)
+    assert h.grad.tolist() == pytest.approx([slope], rel=1e-6)

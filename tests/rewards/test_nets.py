@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -69,3 +71,55 @@ def test_the_normaliser_travels_in_the_state() -> None:
     fitted, fresh = net(fitted_normaliser(steps.obs)), net(Normaliser(3), seed=1)
     fresh.load_state_dict(fitted.state_dict())
     assert torch.equal(fresh(steps), fitted(steps))
+
+
+def knowing(scale: float = 10.0, normaliser: Normaliser | None = None) -> LogitNet:
+    spec = LogitSpec(3, 2, (5, 4), absorbing_scale=scale)
+    return LogitNet(spec, normaliser or Normaliser(3), torch_stream(0, "net"))
+
+
+def test_the_absorbing_state_is_seen_as_its_scaled_flag_alone() -> None:
+    steps = batch(50)
+    logit = knowing(7.0, fitted_normaliser(steps.obs))
+    flags = torch.arange(50) % 5 == 0
+    inputs = logit.inputs(replace(steps, absorbing=flags))
+    # its zeros are no observation of mean 4: normalised they would be a state like others
+    assert (inputs[flags, :3] == 0).all()
+    assert torch.equal(inputs[~flags, :3], logit.normaliser(steps.obs)[~flags])
+    assert torch.equal(inputs[:, 3:5], steps.action)
+    assert torch.equal(inputs[:, 5], 7.0 * flags.float())
+
+
+def test_no_flags_are_flags_that_are_down() -> None:
+    steps, logit = batch(7), knowing()
+    down = replace(steps, absorbing=torch.zeros(7, dtype=torch.bool))
+    assert torch.equal(logit(steps), logit(down))
+
+
+def test_the_logit_of_the_absorbing_state_is_that_of_its_rows() -> None:
+    steps, logit = batch(7), knowing(normaliser=fitted_normaliser(batch(50).obs))
+    zeros = replace(steps, obs=0 * steps.obs, action=0 * steps.action)
+    absorbed = logit(replace(zeros, absorbing=torch.ones(7, dtype=torch.bool)))
+    torch.testing.assert_close(absorbed, logit.of_absorbing().expand(7))
+    # whatever the row of obs holds: the flag says which state it is
+    other = replace(zeros, obs=steps.obs, absorbing=torch.ones(7, dtype=torch.bool))
+    assert torch.equal(logit(other), absorbed)
+    assert not torch.equal(logit(zeros), absorbed)
+
+
+def test_a_network_that_knows_no_absorbing_state_refuses_it() -> None:
+    steps, logit = batch(7), net(Normaliser(3))
+    assert torch.equal(logit(replace(steps, absorbing=torch.zeros(7, dtype=torch.bool))), logit(steps))
+    with pytest.raises(ValueError, match="absorbing state, which this network does not know"):
+        logit(replace(steps, absorbing=torch.arange(7) == 3))
+    with pytest.raises(ValueError, match="knows no absorbing state"):
+        logit.of_absorbing()
+
+
+def test_without_the_new_settings_the_weights_are_drawn_as_before() -> None:
+    # one more input draws other weights; a spectral norm draws the same
+    plain = net(Normaliser(3)).state_dict()
+    spec = LogitSpec(3, 2, (5, 4), spectral_norm=True)
+    normed = LogitNet(spec, Normaliser(3), torch_stream(0, "net")).state_dict()
+    assert plain.keys() < normed.keys()
+    assert all(torch.equal(plain[name], normed[name]) for name in plain)
