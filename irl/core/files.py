@@ -89,6 +89,23 @@ def new_folder(path: Path) -> Iterator[Path]:
             raise
 
 
+def check_writable(path: Path) -> None:
+    """Refuse a place that `new_folder` could not fill, before the work that would fill it.
+
+    Raises:
+        OSError: names `path`.
+    """
+    try:
+        with new_folder(path.parent / f".{path.name}.trial"):
+            raise _Undone
+    except _Undone:
+        return
+
+
+class _Undone(Exception):
+    """Ends a block of `new_folder` whose folder is not wanted."""
+
+
 def sha256(path: Path) -> str:
     """Hexadecimal SHA-256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()

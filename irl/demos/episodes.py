@@ -61,18 +61,21 @@ def _check_links(file: h5py.File, size: int) -> None:
     """Refuse what leads out of the file, and what would fill the memory."""
     total = 0
 
-    def look(name: str, link: Any) -> None:
+    def complaint(name: str, link: Any) -> str | None:
         nonlocal total
         if not isinstance(link, h5py.HardLink):
-            raise ValueError(f"{name!r:.80} is a link; expected the data themselves")
+            return f"{name!r:.80} is a link; expected the data themselves"
         item = file[name]
         if isinstance(item, h5py.Dataset):
             if item.is_virtual or item.external:
-                raise ValueError(f"{name!r:.80} is kept in another file; expected the data themselves")
+                return f"{name!r:.80} is kept in another file; expected the data themselves"
             # not nbytes, which is computed in 64 bits and may overflow
             total += math.prod(item.shape or ()) * item.dtype.itemsize
+        return None
 
-    file.visititems_links(look)
+    # returned, not raised: h5py does not always survive an exception out of a visitor
+    if (found := file.visititems_links(complaint)) is not None:
+        raise ValueError(found)
     if total > max(MOST_BYTES, MOST_TIMES * size):
         raise ValueError(f"it claims to hold {total / 1e9:.1f} GB in a file of {size / 1e6:.1f} MB")
 

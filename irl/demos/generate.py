@@ -62,6 +62,10 @@ def generate(
         raise UserError(f"no seeds for {dataset_id}; expected at least one episode")
     labels = {"algorithm_name": algorithm, "author": author, "description": description}
     scores = {"ref_min_score": float(random_return), "ref_max_score": float(expert_return)}
+    try:
+        files.check_writable(target)
+    except OSError as error:
+        raise _not_written(target, error) from error
     env = make(env_id)
     try:
         buffers = _record_all(env_id, env, act, seeds, on_episode)
@@ -154,9 +158,14 @@ def _write(
             files.write_json(folder / "data" / METADATA, metadata | {DIGEST: digest})
     # RuntimeError: what h5py says where a file cannot be closed
     except (OSError, RuntimeError) as error:
-        raise UserError(
-            f"cannot write {target}: {error}; free some space, or name another folder with --datasets-root"
-        ) from error
+        raise _not_written(target, error) from error
+
+
+def _not_written(target: Path, error: Exception) -> UserError:
+    said = (error.strerror if isinstance(error, OSError) else None) or error
+    return UserError(
+        f"cannot write {target}: {said}; name a folder that can be written, with space, with --datasets-root"
+    )
 
 
 def _mark_namespaces(root: Path, target: Path) -> None:

@@ -31,7 +31,9 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
 
 _FULL = "; free some space, or choose a folder on another disk"
 _CLOSED = "; choose a folder that you may write to"
-HINTS = dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _FULL)
+_FILE = "; a file is where a folder is needed: choose another place"
+HINTS = dict.fromkeys((errno.EEXIST, errno.ENOTDIR), _FILE)
+HINTS |= dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _FULL)
 HINTS |= dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _CLOSED)
 
 

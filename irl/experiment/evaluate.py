@@ -119,11 +119,12 @@ def _read(env_id: str, snapshots: Mapping[int, Path]) -> tuple[Policy, dict[int,
 
 def _check_reward(reward: LearnedReward, env_id: str, policy: Policy, path: Path) -> None:
     takes = reward.spec.net.obs_dim, reward.spec.net.action_dim
-    if reward.spec.env_id != env_id or takes != (policy.spec.obs_dim, policy.spec.action_dim):
+    needs = policy.spec.obs_dim, policy.spec.action_dim
+    if reward.spec.env_id != env_id or takes != needs:
         raise UserError(
-            f"the reward in {path} is of {reward.spec.env_id} with observations of {takes[0]} and actions of "
-            f"{takes[1]}; {env_id} has {policy.spec.obs_dim} and {policy.spec.action_dim}: take the snapshot "
-            f"away, or choose the run it belongs to"
+            f"the reward in {path / 'reward'} is of {reward.spec.env_id} with observations of {takes[0]} and "
+            f"actions of {takes[1]}; {env_id} has {needs[0]} and {needs[1]}: take the snapshot away, or choose "
+            f"the run it belongs to"
         )
 
 
