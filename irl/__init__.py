@@ -6,6 +6,9 @@
 >>> reward(irl.from_episodes(demos.episodes)).mean()                      # doctest: +SKIP
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from irl.core.errors import UserError
 from irl.core.types import Episode, RewardFn, Transitions, concatenate, from_episodes
 from irl.demos.load import Demos, load_demos
@@ -13,6 +16,10 @@ from irl.envs.rollouts import rollout, rollouts
 from irl.policies.policy import Policy, load_policy
 from irl.policies.shelf import find as load_expert
 from irl.rewards.artefact import LearnedReward, load_reward
+from irl.rewards.wrapper import RewardWrapper
+
+if TYPE_CHECKING:
+    from irl.learners.reward_vec import RewardVecWrapper
 
 __all__ = [
     "Demos",
@@ -20,6 +27,8 @@ __all__ = [
     "LearnedReward",
     "Policy",
     "RewardFn",
+    "RewardVecWrapper",
+    "RewardWrapper",
     "Transitions",
     "UserError",
     "concatenate",
@@ -31,3 +40,10 @@ __all__ = [
     "rollout",
     "rollouts",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # Stable-Baselines3 takes seconds to import, and only this name needs it
+    if name == "RewardVecWrapper":
+        return import_module("irl.learners.reward_vec").RewardVecWrapper
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
