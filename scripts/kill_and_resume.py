@@ -71,7 +71,7 @@ def ends(run_folder: Path) -> tuple[dict[str, bytes], list[dict]]:
     last = sorted((run_folder / "snapshots").iterdir())[-1]
     weights = {p.relative_to(last).as_posix(): p.read_bytes() for p in sorted(last.rglob("*.safetensors"))}
     rows = [json.loads(line) for line in (run_folder / "metrics.jsonl").read_text().splitlines()]
-    return weights, [{k: v for k, v in row.items() if k != "wall_s"} for row in rows]
+    return weights, [{k: v for k, v in row.items() if k not in ("wall_s", "checkpoint_s")} for row in rows]
 
 
 def compare(name: str, start: tuple[str, ...], resume: tuple[str, ...], folder: Path, s: Settings) -> bool:

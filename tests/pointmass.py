@@ -3,7 +3,8 @@
     x' = clip(x + 0.06 a, +-1.5),   reward = -|x|,   30 steps
 
 Staying alive pays nothing, so a reward that only rewards survival teaches nothing. `Cliff-v0` is the same
-but ends the episode where |x_1| > 1, and `NaNReward-v0` is the same with a reward of NaN.
+but ends the episode where |x_1| > 1, and `NaNReward-v0` is the same with a reward of NaN, `NaNLater-v0`
+from its 700th step on.
 """
 
 from typing import Any
@@ -22,10 +23,11 @@ STEPS = 30
 class PointMass(gym.Env):
     """The task of this module; every reset draws a start in [-1, 1]^2."""
 
-    def __init__(self, cliff: float = np.inf, reward: float | None = None) -> None:
+    def __init__(self, cliff: float = np.inf, reward: float | None = None, good: int = 0) -> None:
         self.observation_space = Box(-1.5, 1.5, (2,), np.float64)
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
         self._cliff, self._reward = cliff, reward
+        self._good = good
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict]:
         super().reset(seed=seed)
@@ -36,7 +38,9 @@ class PointMass(gym.Env):
         # noise in the step, so that a replay that forgets the generator is caught
         push = 0.06 * np.asarray(action, dtype=np.float64) + self.np_random.normal(0.0, 0.01, 2)
         self._x = np.clip(self._x + push, -1.5, 1.5)
-        reward = -float(np.linalg.norm(self._x)) if self._reward is None else self._reward
+        by_hand = self._reward is None or self._good > 0
+        self._good -= 1
+        reward = -float(np.linalg.norm(self._x)) if by_hand else float(self._reward or 0.0)
         return self._x.copy(), reward, bool(abs(self._x[0]) > self._cliff), False, {}
 
 
@@ -50,6 +54,7 @@ def _register(env_id: str, **kwargs: float) -> None:
 _register("PointMass-v0")
 _register("Cliff-v0", cliff=1.0)
 _register("NaNReward-v0", reward=float("nan"))
+_register("NaNLater-v0", reward=float("nan"), good=700)
 _register("NoReward-v0", reward=0.0)
 
 

@@ -13,6 +13,7 @@ import torch
 
 from irl.algorithms.loop import Learner, Round
 from irl.core.config import check_at_least
+from irl.core.finite import check_finite, named
 from irl.core.types import Metrics, Transitions
 
 
@@ -59,7 +60,11 @@ class Adversarial:
         learner.start(discriminator.reward)
 
     def rounds(self, steps: int) -> Iterator[Round]:
-        """Play until `steps` environment steps are taken; the last round may go past them."""
+        """Play until `steps` environment steps are taken; the last round may go past them.
+
+        Raises:
+            NotFinite: the discriminator's weights, the reward or the policy's weights are not finite.
+        """
         while self.learner.env_steps < steps:
             batch = self.learner.collect()
             # Discriminator first: the rollout is then rewarded by what was just fitted to it.
@@ -74,6 +79,7 @@ class Adversarial:
             for _ in range(self.schedule.epochs)
             for batch in policy.minibatches(self.schedule.batch_size, self.rng)
         ]
+        check_finite(named("discriminator", self.discriminator.state_dict()["net"]))
         means = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]}
         return means | self._judge(policy)
 

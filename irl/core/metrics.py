@@ -12,6 +12,7 @@ DECLARED: dict[str, tuple[str, str]] = {
     "round": ("rounds of the loop, counted from 1", "rounds"),
     "env_steps": ("environment steps taken so far, over all environments", "steps"),
     "wall_s": ("time since the run began, pauses between resumes left out", "s"),
+    "checkpoint_s": ("time spent writing checkpoints since the start of the run", "s"),
     "return_mean": ("mean return of the last 20 training episodes, the environment's own reward", "reward"),
     "length_mean": ("mean length of the last 20 training episodes", "steps"),
     "eval_return_mean": ("mean return of the deterministic policy in its own episodes", "reward"),

@@ -4,8 +4,10 @@ config.json  environment.json  metrics.jsonl  tensorboard/  snapshots/<steps>/  
 evaluation.json  report.html
 """
 
+import fcntl
 import json
 import math
+import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -14,6 +16,7 @@ from typing import Any
 
 from irl.core import files, state
 from irl.core.errors import UserError
+from irl.core.log import Logs
 from irl.core.metrics import DECLARED
 
 KEPT_CHECKPOINTS = 2
@@ -24,6 +27,7 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._logs = Logs(path / "checkpoint" / "logs")
 
     @property
     def config(self) -> dict[str, Any]:
@@ -86,9 +90,37 @@ class RunFolder:
         """Write a checkpoint, then drop all but the newest two."""
         root = self.path / "checkpoint"
         with files.new_folder(root / f"{env_steps:09d}") as folder:
-            state.save(folder, content)
-        for old in list(_by_steps(root).values())[:-KEPT_CHECKPOINTS]:
+            state.save(folder, content, self._logs)
+        there = list(_by_steps(root).values())
+        for old in there[:-KEPT_CHECKPOINTS]:
             shutil.rmtree(old)
+        kept = there[-KEPT_CHECKPOINTS:]
+        self._logs.drop_all_but(segment for path in kept for segment in state.used_segments(path))
+
+    def checkpoints(self) -> dict[int, Path]:
+        """Every checkpoint by its environment steps, in order."""
+        return _by_steps(self.path / "checkpoint")
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the run: no other process writes into it meanwhile. The system lets go when this one dies.
+
+        Raises:
+            UserError: another process holds it.
+        """
+        with (self.path / ".lock").open("a+") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                file.seek(0)
+                raise UserError(
+                    f"{self.path} is in use by process {file.read().strip() or 'unknown'}; wait for it, stop it "
+                    f"with kill, or choose another folder with --out"
+                ) from None
+            file.truncate(0)
+            file.write(f"{os.getpid()}\n")
+            file.flush()
+            yield
 
     def load_checkpoint(self) -> tuple[Any | None, list[str]]:
         """The newest checkpoint that can be read, None when there is none; and what was damaged.
@@ -99,7 +131,7 @@ class RunFolder:
         damaged: list[str] = []
         for path in reversed(_by_steps(self.path / "checkpoint").values()):
             try:
-                return state.load(path), damaged
+                return state.load(path, self._logs), damaged
             except UserError as error:
                 damaged.append(str(error))
         if damaged:

@@ -12,7 +12,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from irl.core import records
-from irl.core.config import check_at_least, check_seed, to_json
+from irl.core.config import check_at_least, check_seed, from_json, to_json
+from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment, versions
 from irl.core.rng import episode_seeds
@@ -20,7 +21,7 @@ from irl.envs.make import make
 from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import ExpertRun, Watch
-from irl.experiment.play import Player
+from irl.experiment.play import MAY_CHANGE, Player
 from irl.experiment.progress import each_episode, progress
 from irl.experiment.recipes import recipe
 from irl.policies import shelf
@@ -38,8 +39,10 @@ class TrainExpert:
     Without other flags this repeats the recipe of the shipped expert.
     """
 
-    env_id: str
+    env_id: str = ""
     """Gymnasium id of the task."""
+    resume: Path | None = None
+    """Run folder to go on with, by its own settings; no other is needed."""
     algo: Literal["ppo", "sac"] = "ppo"
     """Which learner."""
     steps: int | None = None
@@ -62,6 +65,8 @@ class TrainExpert:
         check_at_least(self, 1, "threads")
         check_seed(self.seed)
         shelf.check_level(self.level)
+        if not self.env_id and self.resume is None:
+            raise ValueError("name the task with --env-id, or a run to go on with by --resume")
         if self.steps is not None:
             check_at_least(self, 1, "steps")
 
@@ -96,8 +101,8 @@ class ListExperts:
 
 def train(command: TrainExpert) -> None:
     """Train, measure, write policy and card into the run folder, and shelve them."""
-    make(command.env_id).close()
-    run = _expert_run(command)
+    run = _resumed(command) if command.resume is not None else _expert_run(command)
+    make(run.env_id).close()
     torch.set_num_threads(run.threads)
     folder = _open_or_create(run)
     algorithm = build.forward(run)
@@ -110,9 +115,25 @@ def train(command: TrainExpert) -> None:
         seed=run.seed,
         snapshot=lambda path: save_policy(algorithm.learner.policy(), path / shelf.POLICY),
     )
-    player.run(to_go_on=command_line())
+    player.run(to_go_on=f"irl experts train --resume {folder.path}")
     steps, last = list(folder.snapshots().items())[-1]
     _shelve(run, load_policy(last / shelf.POLICY), steps, command)
+
+
+def _resumed(command: TrainExpert) -> ExpertRun:
+    assert command.resume is not None
+    folder = records.open_run(command.resume)
+    if command != TrainExpert(
+        resume=command.resume, overwrite=command.overwrite, policies_root=command.policies_root
+    ):
+        raise UserError(
+            f"--resume goes on by the settings of {folder.path}; leave the others away, or choose another --out"
+        )
+    if (kind := folder.config.get("kind")) != ExpertRun.KIND:
+        raise UserError(
+            f"{folder.path} is a run of kind {kind!r}; go on with: irl train --resume {folder.path}"
+        )
+    return from_json(ExpertRun, {**folder.config, "out": str(folder.path)}, str(folder.path / "config.json"))
 
 
 def _expert_run(command: TrainExpert) -> ExpertRun:
@@ -135,11 +156,10 @@ def _open_or_create(run: ExpertRun) -> records.RunFolder:
     config = to_json(run)
     if (run.out / "config.json").is_file():
         folder = records.open_run(run.out)
-        if different := [
-            k for k in config if config[k] != folder.config.get(k) and k not in ("watch", "out")
-        ]:
+        if changed := differences(without(folder.config, MAY_CHANGE), without(config, MAY_CHANGE)):
             raise UserError(
-                f"{run.out} holds a run with other settings ({', '.join(different)}); choose another --out"
+                f"{run.out} holds a run with other settings: {'; '.join(changed)}. Choose another --out, or go on "
+                f"with that run: irl experts train --resume {run.out}"
             )
         return folder
     return records.create(run.out, config, environment(command_line(), run.device))
@@ -152,7 +172,7 @@ def _shelve(run: ExpertRun, policy: Policy, steps: int, command: TrainExpert) ->
     card = Card(
         env_id=run.env_id,
         level=run.level,
-        algorithm=command.algo,
+        algorithm=run.learner.KIND,
         steps=steps,
         seed=run.seed,
         measured=measured,

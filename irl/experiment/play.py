@@ -16,6 +16,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from irl.algorithms.loop import Learner, Round
+from irl.core.differences import differences, without
+from irl.core.errors import UserError
+from irl.core.finite import NotFinite
 from irl.core.metrics import Row
 from irl.core.records import RunFolder, snapshot_steps
 from irl.core.rng import episode_seeds
@@ -24,6 +27,12 @@ from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Watch
 from irl.experiment.curves import curves
 from irl.experiment.progress import progress, training_words
+
+MOST_CHECKPOINTING = 0.02
+"""Share of the time that checkpoints may take."""
+
+MAY_CHANGE = ("watch", "out", "datasets_root")
+"""Settings that change no weight: they may be others when a run goes on."""
 
 RECENT = 20
 """Training episodes that `return_mean` is the mean of."""
@@ -65,22 +74,37 @@ class Player:
         self.env_id, self.steps, self.snapshot = env_id, steps, snapshot
         self._eval_seeds = episode_seeds(seed, "evaluation while training", watch.eval_episodes)
         self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
-        self._wall_s = 0.0
+        self._wall_s = self._checkpoint_s = self._last_save_s = 0.0
 
     def run(self, to_go_on: str) -> None:
         """Go on from the last checkpoint, play to the end, and close the environments.
 
         Raises:
             Interrupted: the user asked to stop; `to_go_on`, the command that goes on, was printed.
+            UserError: another process plays this run, its settings are not those it was begun with, or
+                a number stopped being finite.
         """
-        self.resume()
         try:
-            self.play()
+            with self.folder.locked():
+                self.resume()
+                self.play()
         except Interrupted:
             print(f"stopped; go on with: {to_go_on}", file=sys.stderr)
             raise
+        except NotFinite as error:
+            raise UserError(self._diverged(error, to_go_on)) from error
         finally:
             self.algorithm.learner.close()
+
+    def _diverged(self, error: NotFinite, to_go_on: str) -> str:
+        rounds, kept = self.algorithm.index + 1, self.folder.checkpoints()
+        words = f"training stopped in round {rounds}: {error}; "
+        if not kept:
+            return words + "there was no checkpoint yet; lower a learning rate and begin again"
+        return words + (
+            f"the checkpoint of step {max(kept):,} is good and kept. Going on ({to_go_on}) comes to the same "
+            f"end; begin again with a lower learning rate"
+        )
 
     def resume(self) -> None:
         """Go on from the folder's last checkpoint; from the start when there is none.
@@ -91,10 +115,19 @@ class Player:
         for words in damaged:
             print(f"irl: {words}; going on from the checkpoint before", file=sys.stderr)
         if content is not None:
+            self._same_settings(content["config"])
             self.algorithm.load_state_dict(content["algorithm"])
             self._recent.extend(content["recent"])
-            self._wall_s = content["wall_s"]
+            self._wall_s, self._checkpoint_s = content["wall_s"], content["checkpoint_s"]
         self.folder.forget_rounds_after(self.algorithm.index)
+
+    def _same_settings(self, before: dict[str, Any]) -> None:
+        changed = differences(without(before, MAY_CHANGE), without(self.folder.config, MAY_CHANGE))
+        if changed:
+            raise UserError(
+                f"{self.folder.path} was begun with other settings than its config.json has now: "
+                f"{'; '.join(changed)}. Undo that, or begin a new run with --config and --out"
+            )
 
     def play(self) -> None:
         """Play to the end.
@@ -119,12 +152,17 @@ class Player:
                 due = self._snapshots(due)
                 rate = (learner.env_steps - start) / (time.monotonic() - began - self._wall_s)
                 report(min(learner.env_steps, self.steps), training_words(row, rate))
-                late = time.monotonic() - saved > self.watch.checkpoint_every_s
+                late = time.monotonic() - saved > self._between_checkpoints()
                 if late or asked() or learner.env_steps >= self.steps:
                     self._checkpoint(time.monotonic() - began)
                     saved = time.monotonic()
                 if asked() and learner.env_steps < self.steps:
                     raise Interrupted
+
+    def _between_checkpoints(self) -> float:
+        """Seconds: as asked for, or more where writing takes long; 0 is after every round."""
+        every = self.watch.checkpoint_every_s
+        return max(every, self._last_save_s / MOST_CHECKPOINTING) if every else 0.0
 
     def _row(self, round_: Round, wall_s: float) -> Row:
         self._recent.extend(self.algorithm.learner.take_finished())
@@ -134,6 +172,7 @@ class Player:
             "round": round_.index,
             "env_steps": round_.env_steps,
             "wall_s": round(wall_s, 3),
+            "checkpoint_s": round(self._checkpoint_s, 3),
             "return_mean": float(np.mean(returns)) if returns else None,
             "length_mean": float(np.mean(lengths)) if lengths else None,
         }
@@ -162,8 +201,13 @@ class Player:
             "algorithm": self.algorithm.state_dict(),
             "recent": [list(item) for item in self._recent],
             "wall_s": wall_s,
+            "checkpoint_s": self._checkpoint_s,
+            "config": self.folder.config,
         }
+        began = time.monotonic()
         self.folder.save_checkpoint(self.algorithm.learner.env_steps, content)
+        self._last_save_s = time.monotonic() - began
+        self._checkpoint_s += self._last_save_s
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from irl.demos.load import Demos
 from irl.discriminators.gail import GAIL
 from irl.envs.make import check_module
 from irl.experiment import build
-from irl.experiment.configs import GAILRun
+from irl.experiment.configs import ExpertRun, GAILRun
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
 from irl.policies.policy import save_policy
@@ -66,6 +66,10 @@ def go_on(command: Resume) -> None:
             "--resume goes on in its own folder; leave --out away, or repeat the run with --config"
         )
     folder = records.open_run(command.resume)
+    if folder.config.get("kind") == ExpertRun.KIND:
+        raise UserError(
+            f"{folder.path} trains an expert; go on with: irl experts train --resume {folder.path}"
+        )
     config = from_json(GAILRun, folder.config, str(folder.path / "config.json"))
     demos = drawn_again(config, folder)
     torch.set_num_threads(config.threads)

@@ -24,6 +24,7 @@ from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
 from irl.core.config import check_at_least
+from irl.core.finite import NotFinite, check_finite, named
 from irl.core.nets import Normaliser
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
@@ -165,6 +166,7 @@ class PPOLearner:
 
         Raises:
             RuntimeError: nothing was collected since the last call.
+            NotFinite: the reward, or a weight after the steps, is NaN or infinite.
         """
         if self._batch is None:
             raise RuntimeError("collect a rollout before improving on it")
@@ -172,7 +174,7 @@ class PPOLearner:
         raw = self._give_rewards(batch, reward)
         # SB3's train() reads the remaining progress for its schedules
         self.model._update_current_progress_remaining(self.env_steps, self.total_steps)
-        self.model.train()
+        self._train()
         self._average.update(_actor_weights(self.model))
         if self._running:
             # after the gradient steps: within a round, old and new log pi see one normaliser
@@ -183,11 +185,25 @@ class PPOLearner:
             "reward/scale": self._scale.std,
         }
 
+    def _train(self) -> None:
+        weights = self.model.policy.state_dict()
+        try:
+            self.model.train()
+        except ValueError as error:
+            # torch's distributions refuse a mean that is not finite; the weights may still be, and be huge
+            check_finite(named("policy", weights))
+            if "constraint" in str(error):
+                raise NotFinite("policy's mean of the actions") from error
+            raise
+        check_finite(named("policy", weights))
+
     @torch.no_grad()
     def _give_rewards(self, batch: Transitions, reward: RewardFn) -> np.ndarray:
         model, buffer = self.model, self.model.rollout_buffer
         shape = buffer.rewards.shape
-        raw = reward(batch).double().cpu().numpy().reshape(shape)
+        given = reward(batch)
+        check_finite({"reward of the rollout": given})
+        raw = given.double().cpu().numpy().reshape(shape)
         ended = (batch.terminated | batch.truncated).cpu().numpy().reshape(shape)
         self._scale.update(raw, ended)
         buffer.rewards[:] = raw / self._scale.std

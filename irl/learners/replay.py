@@ -12,6 +12,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from irl.core.log import Columns, Log
 from irl.core.types import Transitions
 
 
@@ -96,17 +97,42 @@ class Replay:
         return self._free.pop()
 
     def state_dict(self) -> dict[str, Any]:
-        """Everything remembered so far. Cost: the whole memory."""
-        used = min(self.added + self.n_envs, self._rows)
-        columns = {name: getattr(self, name)[:used] for name in _COLUMNS}
-        return {"columns": columns, "ends": self._ends, "free": list(self._free), "added": self.added}
+        """Everything needed to go on; the transitions as a log, of which a checkpoint writes the new ones."""
+        head = self._newest()
+        return {
+            "log": Log("replay", self.added - len(self), self.added, self._columns),
+            "newest": self._obs[head].cpu(),
+        }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go on where another memory of the same size was."""
-        for name, values in state["columns"].items():
-            getattr(self, name)[: len(values)] = values.to(self.device)
-        self._ends = state["ends"].to(self.device)
-        self._free, self.added = list(state["free"]), state["added"]
+        rows = state["log"]
+        for first, columns in rows.pieces:
+            self._restore(first, columns, max(rows.start - first, 0))
+        self.added = rows.stop
+        self._obs[self._newest()] = state["newest"].to(self.device)
+
+    def _newest(self) -> slice:
+        """Where the observations after the newest step are."""
+        head = self.added % self._rows
+        return slice(head, head + self.n_envs)
+
+    def _columns(self, start: int, stop: int) -> Columns:
+        rows = torch.arange(start, stop, device=self.device) % self._rows
+        columns = {name: getattr(self, f"_{name}")[rows] for name in _COLUMNS}
+        slots = self._end_of[rows]
+        columns["ends"] = self._ends[slots[slots >= 0].long()]
+        return {name: column.cpu() for name, column in columns.items()}
+
+    def _restore(self, first: int, columns: Columns, skipped: int) -> None:
+        ended = columns["terminated"] | columns["truncated"]
+        ends = columns["ends"][int(ended[:skipped].sum()) :]
+        rows = torch.arange(first + skipped, first + len(ended), device=self.device) % self._rows
+        for name in _COLUMNS:
+            getattr(self, f"_{name}")[rows] = columns[name][skipped:].to(self.device)
+        for row, end in zip(rows[ended[skipped:].to(self.device)].tolist(), ends, strict=True):
+            self._end_of[row] = slot = self._new_slot()
+            self._ends[slot] = end.to(self.device)
 
 
-_COLUMNS = ("_obs", "_action", "_own", "_terminated", "_truncated", "_end_of")
+_COLUMNS = ("obs", "action", "own", "terminated", "truncated")

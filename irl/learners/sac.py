@@ -23,6 +23,7 @@ from stable_baselines3.sac.policies import Actor
 from torch import Tensor, nn
 
 from irl.core.config import check_at_least
+from irl.core.finite import check_finite, named
 from irl.core.nets import Normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions
@@ -157,7 +158,11 @@ class SACLearner:
         self._reward = reward
 
     def collect(self) -> Transitions:
-        """The steps of one round; each is followed by its updates once the random ones are over."""
+        """The steps of one round; each is followed by its updates once the random ones are over.
+
+        Raises:
+            NotFinite: a drawn batch's reward, or a weight after the round, is NaN or infinite.
+        """
         for _ in range(self.config.steps_per_round // self.config.n_envs):
             self._step()
             if self._env_steps > self.config.learning_starts:
@@ -165,6 +170,8 @@ class SACLearner:
             while self._owed >= 1.0:
                 self._learn()
                 self._owed -= 1.0
+        for what in ("critic", "actor"):
+            check_finite(named(what, getattr(self.model, what).state_dict()))
         self._average.update(_actor_weights(self.model.actor))
         return self.venv.take().to(self.model.device)
 
@@ -187,6 +194,7 @@ class SACLearner:
         batch = self.replay.sample(self.config.batch_size, self._rng)
         with torch.no_grad():
             reward = self._reward(batch).float()
+        check_finite({"reward of a drawn batch": reward})
         remaining = 1.0 - self._env_steps / self._total_steps
         self._update(batch, reward, self._rate(remaining) if callable(self._rate) else self._rate)
 

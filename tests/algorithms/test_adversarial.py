@@ -52,7 +52,10 @@ class Told:
     def _not_asked(self) -> Any:
         raise AssertionError("a round asks for no such thing")
 
-    take_finished = policy = state_dict = close = _not_asked
+    take_finished = policy = close = _not_asked
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"net": {}}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         self._not_asked()

@@ -226,4 +226,19 @@ def test_other_tools_can_read_both_files(tmp_path: Path) -> None:
     state.save(tmp_path, {"steps": 5, 0: (torch.tensor([1.5]),)})
     one = {"": "tuple", "of": [{"": "tensor", "of": "0"}]}
     content = json.loads((tmp_path / state.STRUCTURE).read_text())
-    assert content == {"": "dict", "of": [["steps", 5], [0, one]]}
+    assert content["state"] == {"": "dict", "of": [["steps", 5], [0, one]]}
+
+
+def test_a_changed_number_is_damage_and_not_another_number(tmp_path: Path) -> None:
+    state.save(tmp_path, {"steps": 5, "weights": torch.zeros(3)})
+    text = (tmp_path / state.STRUCTURE).read_text()
+    (tmp_path / state.STRUCTURE).write_text(text.replace("5]", "6]", 1))
+    with pytest.raises(UserError, match="not what was written"):
+        state.load(tmp_path)
+    (tmp_path / state.STRUCTURE).write_text(text)
+    assert state.load(tmp_path)["steps"] == 5
+    content = bytearray((tmp_path / state.ARRAYS).read_bytes())
+    content[-1] ^= 1
+    (tmp_path / state.ARRAYS).write_bytes(content)
+    with pytest.raises(UserError, match="not what was written"):
+        state.load(tmp_path)

@@ -1,10 +1,16 @@
 """The memory against a slow one that keeps every transition as it came."""
 
+import itertools
+from pathlib import Path
+
 import numpy as np
+import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from irl.core import state
+from irl.core.log import Logs
 from irl.core.types import Transitions
 from irl.learners.replay import Replay
 
@@ -56,13 +62,34 @@ def test_the_side_table_of_ends_does_not_grow_with_time() -> None:
     assert len(replay._ends) <= 32
 
 
-def test_a_memory_goes_on_where_another_was() -> None:
+@pytest.mark.parametrize("steps", [1, 4, 23])
+def test_a_memory_goes_on_where_another_was(steps: int, tmp_path: Path) -> None:
     one, other = Replay(15, 2, O, A), Replay(15, 2, O, A)
-    play(one, 23, seed=1)
-    other.load_state_dict(one.state_dict())
+    play(one, steps, seed=1)
+    state.save(tmp_path / "a", one.state_dict(), Logs(tmp_path / "logs"))
+    other.load_state_dict(state.load(tmp_path / "a", Logs(tmp_path / "logs")))
     assert everything(one) == everything(other)
     play(one, 9, seed=2)
     play(other, 9, seed=2)
     assert everything(one) == everything(other)
     draws = [r.sample(7, torch.Generator().manual_seed(3)) for r in (one, other)]
     assert flat(draws[0]) == flat(draws[1])
+
+
+def test_a_checkpoint_writes_what_came_since_the_last_one(tmp_path: Path) -> None:
+    replay, logs = Replay(100, 2, O, A), Logs(tmp_path / "logs")
+    sizes = []
+    for part in range(8):
+        play(replay, 10, seed=part)
+        state.save(tmp_path / str(part), replay.state_dict(), logs)
+        sizes.append({path.name: path.stat().st_size for path in (tmp_path / "logs").iterdir()})
+    new = [sorted(set(now) - set(before)) for before, now in itertools.pairwise(sizes)]
+    assert [len(names) for names in new] == [1] * 7
+    assert [sum(now.values()) - sum(before.values()) for before, now in itertools.pairwise(sizes)] < [
+        2500
+    ] * 7
+    logs.drop_all_but(state.used_segments(tmp_path / "7"))
+    assert len(list((tmp_path / "logs").iterdir())) == 5  # 100 of 160 rows, 20 a piece
+    other = Replay(100, 2, O, A)
+    other.load_state_dict(state.load(tmp_path / "7", logs))
+    assert everything(other) == everything(replay)

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from irl.core import state
+from irl.core.log import Logs
 from irl.core.types import Transitions
 from irl.learners.sac import SACConfig, SACLearner
 from irl.rewards.mujoco import HandWritten
@@ -110,10 +111,10 @@ def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(tmp_path: Path)
     for round_ in range(5):
         straight.collect()
         if round_ == 2:
-            state.save(tmp_path, straight.state_dict())
+            state.save(tmp_path, straight.state_dict(), Logs(tmp_path / "logs"))
     torch.manual_seed(99)
     resumed = learner(config=config)
-    resumed.load_state_dict(state.load(tmp_path))
+    resumed.load_state_dict(state.load(tmp_path, Logs(tmp_path / "logs")))
     resumed.start(HandWritten())
     for _ in range(2):
         resumed.collect()
