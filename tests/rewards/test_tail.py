@@ -51,6 +51,11 @@ def test_a_time_limit_is_no_termination() -> None:
     logit = net()
     cut = replace(steps(), truncated=torch.ones(12, dtype=torch.bool))
     assert torch.equal(tail.reward(logit, "logit", cut, 0.9), logit(steps()))
+    # nor beside one that is
+    fell = torch.arange(12) == 5
+    both = tail.reward(logit, "logit", replace(cut, truncated=~fell, terminated=fell), 0.9)
+    assert torch.equal(both[~fell], logit(steps())[~fell])
+    assert not torch.equal(both[fell], logit(steps())[fell])
 
 
 def test_absorbed_steps_are_not_paid_twice() -> None:
