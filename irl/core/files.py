@@ -90,16 +90,28 @@ def new_folder(path: Path) -> Iterator[Path]:
 
 
 def check_writable(path: Path) -> None:
-    """Refuse a place that `new_folder` could not fill, before the work that would fill it.
+    """Refuse a place where nothing could be written, before the work that would be.
 
     Raises:
         OSError: names `path`.
     """
-    try:
-        with new_folder(path.parent / f".{path.name}.trial"):
-            raise _Undone
-    except _Undone:
-        return
+    with suppress(_Undone), _named(path), new_folder(path.parent / f".{path.name}.trial"):
+        raise _Undone
+
+
+def check_room(folder: Path, size: int) -> None:
+    """Refuse a disk that has no room for `size` bytes: they are written and taken away again.
+
+    For writers that do not survive a full disk. What the system says is free may not be ours.
+
+    Raises:
+        OSError: there is no room.
+    """
+    with tempfile.TemporaryFile(dir=folder) as file:
+        for start in range(0, size, 2**20):
+            file.write(bytes(min(2**20, size - start)))
+        file.flush()
+        os.fsync(file.fileno())
 
 
 class _Undone(Exception):

@@ -144,6 +144,8 @@ def _write(
         requirements.append(f"mujoco=={importlib.metadata.version('mujoco')}")
     try:
         with files.new_folder(target) as folder, minari_at(folder / "aside"):
+            # h5py prints a traceback for every piece that it cannot write
+            files.check_room(folder, _most_bytes(buffers))
             dataset = minari.create_dataset_from_buffers(
                 dataset_id, buffers, env=env, requirements=requirements, data_format="hdf5", **labels
             )
@@ -159,6 +161,23 @@ def _write(
     # RuntimeError: what h5py says where a file cannot be closed
     except (OSError, RuntimeError) as error:
         raise _not_written(target, error) from error
+
+
+def _most_bytes(buffers: list[EpisodeBuffer]) -> int:
+    """What the episodes take in HDF5, at most: each column its own bytes twice, in chunks, and an index."""
+    columns = [
+        column
+        for b in buffers
+        for column in (
+            b.observations,
+            b.actions,
+            b.rewards,
+            b.terminations,
+            b.truncations,
+            *(b.infos or {}).values(),
+        )
+    ]
+    return sum(2 * np.asarray(column).nbytes + 4096 for column in columns)
 
 
 def _not_written(target: Path, error: Exception) -> UserError:

@@ -1,5 +1,6 @@
 """Curves for TensorBoard, in the run folder's tensorboard/."""
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,8 @@ def curves(run: Path, start: int = 0, write: bool = True) -> Iterator[Callable[[
         return
     from torch.utils.tensorboard import SummaryWriter  # a second to import, and often not wanted
 
-    with SummaryWriter(str(run / "tensorboard"), purge_step=start + 1) as writer:
+    folder = str(run / "tensorboard")
+    with _said_once(folder), SummaryWriter(folder, purge_step=start + 1) as writer:
 
         def draw(row: Row) -> None:
             steps = row["env_steps"]
@@ -28,3 +30,23 @@ def curves(run: Path, start: int = 0, write: bool = True) -> Iterator[Callable[[
                     writer.add_scalar(name, value, int(steps))
 
         yield draw
+
+
+@contextmanager
+def _said_once(folder: str) -> Iterator[None]:
+    """A disk that fails is said once, with its folder: TensorBoard's own thread prints it too."""
+
+    def hear(failed: threading.ExceptHookArgs) -> None:
+        # the writer raises it again in the thread that draws
+        if not issubclass(failed.exc_type, OSError):
+            before(failed)
+
+    before, threading.excepthook = threading.excepthook, hear
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror, folder) from error
+    finally:
+        threading.excepthook = before

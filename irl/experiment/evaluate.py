@@ -56,8 +56,9 @@ class Evaluate:
 def evaluate(command: Evaluate) -> None:
     """Evaluate, write, print."""
     folder = records.open_run(command.run)
+    files.check_writable(target := folder.path / "evaluation.json")
     result = evaluation(folder, command)
-    files.write_json(folder.path / "evaluation.json", result)
+    files.write_json(target, result)
     report = write_report(folder.path)
     console = Console()
     console.print(evaluation_table(result))
@@ -123,8 +124,8 @@ def _check_reward(reward: LearnedReward, env_id: str, policy: Policy, path: Path
     if reward.spec.env_id != env_id or takes != needs:
         raise UserError(
             f"the reward in {path / 'reward'} is of {reward.spec.env_id} with observations of {takes[0]} and "
-            f"actions of {takes[1]}; {env_id} has {needs[0]} and {needs[1]}: take the snapshot away, or choose "
-            f"the run it belongs to"
+            f"actions of {takes[1]}; {env_id} has {needs[0]} and {needs[1]}: take the snapshot away, or "
+            f"choose the run it belongs to"
         )
 
 

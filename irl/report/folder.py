@@ -108,12 +108,13 @@ def why_missing(evaluation: Mapping[str, Any], path: str) -> str:
 
 
 def _read_object(path: Path, problems: dict[str, str]) -> dict[str, Any]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda _: None)
-    except FileNotFoundError:
+    # a pipe in its place would be waited for
+    if not path.is_file():
         problems[path.name] = f"{path.name} is not in the run folder"
         return {}
-    except (OSError, ValueError) as error:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda _: None)
+    except (OSError, ValueError, RecursionError) as error:
         problems[path.name] = f"{path.name} cannot be read: {error}"
         return {}
     if not isinstance(document, dict):
@@ -123,11 +124,11 @@ def _read_object(path: Path, problems: dict[str, str]) -> dict[str, Any]:
 
 
 def _read_lines(path: Path, problems: dict[str, str]) -> list[dict[str, Any]]:
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except FileNotFoundError:
+    if not path.is_file():
         problems[path.name] = f"{path.name} is not in the run folder"
         return []
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError) as error:
         problems[path.name] = f"{path.name} cannot be read: {error}"
         return []
@@ -135,7 +136,7 @@ def _read_lines(path: Path, problems: dict[str, str]) -> list[dict[str, Any]]:
     for line in filter(str.strip, lines):
         try:
             row = json.loads(line, parse_constant=lambda _: None)
-        except ValueError:
+        except (ValueError, RecursionError):
             row = None
         if isinstance(row, dict):
             rows.append(row)

@@ -96,7 +96,7 @@ SETTINGS = {
     "a setting of another type": config(keyed(steps="many"), "steps", "int", "'many'", words=AGAIN),
     "a setting of another type, to judge": config(keyed(threads=1.5), "threads", "int", "1.5"),
     "settings that contradict": config(keyed("learner", n_envs=3), "steps_per_round", words=AGAIN),
-    "settings of another kind": config(keyed(kind="dream"), "'gail'", "'dream'", words=AGAIN),
+    "settings of another kind": config(keyed(kind="dream"), "gail", "'dream'", words=AGAIN),
     "a learner of another kind": config(keyed("learner", kind=[]), "learner", "[]", words=AGAIN),
     "a setting that is an object": config(keyed(env_id={"a": 1}), "env_id", "str", words=AGAIN),
     "a dataset outside its root": Case(
