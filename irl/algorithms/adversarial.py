@@ -42,6 +42,18 @@ class Discriminator(Protocol):
     def load_state_dict(self, state: dict[str, Any]) -> None: ...
 
 
+@torch.no_grad()
+def judge(discriminator: Discriminator, expert: Transitions, policy: Transitions) -> Metrics:
+    """How well it tells the demonstrations from these steps of the policy."""
+    of_expert, of_policy = discriminator.logits(expert), discriminator.logits(policy)
+    return {
+        "discriminator/accuracy_expert": float((of_expert > 0).double().mean()),
+        "discriminator/accuracy_policy": float((of_policy < 0).double().mean()),
+        "discriminator/logit_expert": float(of_expert.mean()),
+        "discriminator/logit_policy": float(of_policy.mean()),
+    }
+
+
 class Adversarial:
     """The two players, and the demonstrations they meet over."""
 
@@ -81,17 +93,7 @@ class Adversarial:
         ]
         check_finite(named("discriminator", self.discriminator.state_dict()["net"]))
         means = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]}
-        return means | self._judge(policy)
-
-    @torch.no_grad()
-    def _judge(self, policy: Transitions) -> Metrics:
-        expert, fresh = self.discriminator.logits(self.expert), self.discriminator.logits(policy)
-        return {
-            "discriminator/accuracy_expert": float((expert > 0).double().mean()),
-            "discriminator/accuracy_policy": float((fresh < 0).double().mean()),
-            "discriminator/logit_expert": float(expert.mean()),
-            "discriminator/logit_policy": float(fresh.mean()),
-        }
+        return means | judge(self.discriminator, self.expert, policy)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on, between two rounds."""

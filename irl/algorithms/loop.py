@@ -1,10 +1,13 @@
 """What every training loop shares: the record of a round, and what a learner can do."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.policies.policy import Policy
+
+BeforeUpdate = Callable[[Transitions], None]
 
 
 @dataclass(frozen=True)
@@ -26,8 +29,11 @@ class Learner(Protocol):
     def env_steps(self) -> int: ...
     @property
     def reward_scale(self) -> float: ...
-    def start(self, reward: RewardFn) -> None:
-        """Told once, before the first round: SAC updates while it collects, by this reward."""
+    def start(self, reward: RewardFn, before_update: BeforeUpdate | None = None) -> None:
+        """Told once, before the first round: SAC updates while it collects, by this reward.
+
+        `before_update` is called with each batch drawn from a replay memory, before it is rewarded.
+        """
         ...
 
     def collect(self) -> Transitions: ...

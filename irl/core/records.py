@@ -113,9 +113,10 @@ class RunFolder:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 file.seek(0)
+                owner = file.read().strip() or "unknown"
                 raise UserError(
-                    f"{self.path} is in use by process {file.read().strip() or 'unknown'}; wait for it, stop it "
-                    f"with kill, or choose another folder with --out"
+                    f"{self.path} is in use by process {owner}; wait for it, stop it with kill, or choose "
+                    f"another folder with --out"
                 ) from None
             file.truncate(0)
             file.write(f"{os.getpid()}\n")

@@ -11,7 +11,7 @@ from a replay memory, without importance weights (section 4.1 of the paper says 
 
 Differs from the paper: the indicator of s_abs is scaled by 10 and not by 1, because under a one-centred
 penalty s_abs otherwise lies nearer to the expert than a fall does; observations are normalised by the
-demonstrations' fixed moments, the indicator is not; layers of 256 (the authors' code; the text says 100);
+demonstrations' fixed moments, the indicator is not; layers of 128 (the text has 100, the authors' code 256);
 Adam at 3e-4 (1e-3 there); s_T -> s_abs weighs as s_abs does.
 """
 
@@ -25,7 +25,7 @@ from irl.discriminators.gail import GAIL, GAILConfig
 class DACConfig(GAILConfig):
     """How the discriminator learns: GAIL's settings with DAC's values."""
 
-    hidden: tuple[int, ...] = (256, 256)
+    hidden: tuple[int, ...] = (128, 128)
     """Width of each hidden layer."""
     lr: float = 3e-4
     """Adam step size."""

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from irl.core.errors import UserError
 from irl.experiment import demonstrations, evaluate, experts, train
-from irl.experiment.configs import GAILRun
+from irl.experiment.configs import DACRun, GAILRun, GAILSACRun
 from irl.experiment.play import Interrupted
 
 Run = Callable[[Any], None]
@@ -21,7 +21,9 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("demos", "generate"): (demonstrations.GenerateDemos, demonstrations.generate_demos),
     ("demos", "show"): (demonstrations.ShowDemos, demonstrations.show_demos),
     ("demos", "list"): (demonstrations.ListDemos, demonstrations.list_demos),
-    ("train", "gail"): (GAILRun, train.train_gail),
+    ("train", "gail"): (GAILRun, train.train),
+    ("train", "gail-sac"): (GAILSACRun, train.train),
+    ("train", "dac"): (DACRun, train.train),
     ("train",): (train.Resume, train.go_on),
     ("evaluate",): (evaluate.Evaluate, evaluate.evaluate),
     ("experts", "train"): (experts.TrainExpert, experts.train),

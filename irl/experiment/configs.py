@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 from irl.algorithms.adversarial import ScheduleConfig
+from irl.algorithms.interleaved import InterleavedConfig
 from irl.core.config import check_at_least, check_seed
+from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
 from irl.envs.tasks import task_name
 from irl.learners.ppo import PPOConfig
@@ -32,27 +34,27 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class GAILRun:
-    """Generative adversarial imitation learning with PPO."""
+class ImitationRun:
+    """What every method that learns from demonstrations is told."""
 
-    KIND: ClassVar[str] = "gail"
+    KIND: ClassVar[str] = ""
     env_id: str
     """Gymnasium id of the task, e.g. Hopper-v5."""
     demos: str = ""
     """Minari dataset of demonstrations; irl/<task>/expert-v0 unless given."""
     demo_episodes: int = 4
     """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
+    demo_rate: int = 1
+    """Keep every so-manieth step of them, from an offset drawn for each; with an absorbing state, all of its
+    steps stay, at the weight of one."""
     steps: int = 245_760
     """Environment steps in all."""
     seed: int = 0
     """Seed of everything random."""
     out: Path | None = None
-    """Run folder; runs/gail-<task>-s<seed> unless given."""
+    """Run folder; runs/<method>-<task>-s<seed> unless given."""
     datasets_root: Path | None = None
     """Folder of Minari datasets; MINARI_DATASETS_PATH, or expert_data/datasets, unless given."""
-    learner: PPOConfig = field(default_factory=PPOConfig)
-    discriminator: GAILConfig = field(default_factory=GAILConfig)
-    schedule: ScheduleConfig = field(default_factory=ScheduleConfig)
     watch: Watch = field(default_factory=Watch)
     device: Literal["cpu", "cuda"] = "cpu"
     """Where the networks live. MuJoCo runs on the CPU, and networks this small are fastest there too."""
@@ -60,17 +62,63 @@ class GAILRun:
     """Threads of torch's operators; results are the same to the bit only at the same number."""
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "demo_episodes", "steps", "threads")
+        check_at_least(self, 1, "demo_episodes", "demo_rate", "steps", "threads")
         check_seed(self.seed)
 
-    def resolved(self) -> "GAILRun":
+    def resolved(self) -> Self:
         """The same with every default that depends on another setting filled in."""
         task = task_name(self.env_id)
         return replace(
             self,
             demos=self.demos or f"irl/{task}/expert-v0",
-            out=self.out or Path("runs") / f"gail-{task}-s{self.seed}",
+            out=self.out or Path("runs") / f"{self.KIND}-{task}-s{self.seed}",
         )
+
+
+@dataclass(frozen=True)
+class GAILRun(ImitationRun):
+    """Generative adversarial imitation learning with PPO."""
+
+    KIND: ClassVar[str] = "gail"
+    learner: PPOConfig = field(default_factory=PPOConfig)
+    discriminator: GAILConfig = field(default_factory=GAILConfig)
+    schedule: ScheduleConfig = field(default_factory=ScheduleConfig)
+
+
+# On rewards that move, an update with each step; random actions only until there is a batch or four.
+_OFF_POLICY = SACConfig(learning_starts=1000, products="bfloat16")
+
+
+@dataclass(frozen=True)
+class GAILSACRun(ImitationRun):
+    """Generative adversarial imitation learning with SAC, on the steps of its whole memory."""
+
+    KIND: ClassVar[str] = "gail-sac"
+    demo_episodes: int = 5
+    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
+    steps: int = 150_000
+    """Environment steps in all."""
+    learner: SACConfig = _OFF_POLICY
+    discriminator: GAILConfig = field(default_factory=GAILConfig)
+    schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
+
+
+@dataclass(frozen=True)
+class DACRun(ImitationRun):
+    """Discriminator-actor-critic: SAC, the logit as reward, and terminations led into an absorbing state."""
+
+    KIND: ClassVar[str] = "dac"
+    demo_episodes: int = 5
+    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
+    steps: int = 150_000
+    """Environment steps in all."""
+    learner: SACConfig = _OFF_POLICY
+    discriminator: DACConfig = field(default_factory=DACConfig)
+    schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
+
+
+Imitation = GAILRun | GAILSACRun | DACRun
+"""Every method there is, by its `KIND`."""
 
 
 @dataclass(frozen=True)

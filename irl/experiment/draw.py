@@ -8,12 +8,12 @@ from irl.core.errors import UserError
 from irl.core.records import RunFolder
 from irl.demos.load import Demos, check_task, load_demos
 from irl.envs.make import check_module, make
-from irl.experiment.configs import GAILRun
+from irl.experiment.configs import Imitation
 
 RECORD = "demonstrations.json"
 
 
-def draw(config: GAILRun) -> Demos:
+def draw(config: Imitation) -> Demos:
     """The demonstrations that the settings name.
 
     Raises:
@@ -22,7 +22,7 @@ def draw(config: GAILRun) -> Demos:
     return _drawn_of(config, config.datasets_root)
 
 
-def _drawn_of(config: GAILRun, root: Path | None) -> Demos:
+def _drawn_of(config: Imitation, root: Path | None) -> Demos:
     """The demonstrations, once they are known to be of the task and the task is known to start."""
     env = make(config.env_id)
     try:
@@ -46,7 +46,7 @@ def drawn(demos: Demos) -> dict[str, Any]:
     }
 
 
-def drawn_again(config: GAILRun, folder: RunFolder, root: Path | None = None) -> Demos:
+def drawn_again(config: Imitation, folder: RunFolder, root: Path | None = None) -> Demos:
     """The demonstrations that the run in `folder` was begun with.
 
     Raises:

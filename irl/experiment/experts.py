@@ -127,7 +127,8 @@ def _resumed(command: TrainExpert) -> ExpertRun:
         resume=command.resume, overwrite=command.overwrite, policies_root=command.policies_root
     ):
         raise UserError(
-            f"--resume goes on by the settings of {folder.path}; leave the others away, or choose another --out"
+            f"--resume goes on by the settings of {folder.path}; leave the others away, or choose "
+            f"another --out"
         )
     if (kind := folder.config.get("kind")) != ExpertRun.KIND:
         raise UserError(
@@ -158,8 +159,8 @@ def _open_or_create(run: ExpertRun) -> records.RunFolder:
         folder = records.open_run(run.out)
         if changed := differences(without(folder.config, MAY_CHANGE), without(config, MAY_CHANGE)):
             raise UserError(
-                f"{run.out} holds a run with other settings: {'; '.join(changed)}. Choose another --out, or go on "
-                f"with that run: irl experts train --resume {run.out}"
+                f"{run.out} holds a run with other settings: {'; '.join(changed)}. Choose another --out, or "
+                f"go on with that run: irl experts train --resume {run.out}"
             )
         return folder
     return records.create(run.out, config, environment(command_line(), run.device))

@@ -7,16 +7,16 @@ from pathlib import Path
 import torch
 
 from irl.algorithms.adversarial import Adversarial
+from irl.algorithms.interleaved import Interleaved
 from irl.core import files, records
 from irl.core.config import from_json, to_json
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
-from irl.core.types import from_episodes
 from irl.demos.load import Demos
 from irl.discriminators.gail import GAIL
 from irl.envs.make import check_module
 from irl.experiment import build
-from irl.experiment.configs import ExpertRun, GAILRun
+from irl.experiment.configs import ExpertRun, Imitation
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
 from irl.policies.policy import save_policy
@@ -35,8 +35,8 @@ class Resume:
     """Where the repeated run goes; needed with --config."""
 
 
-def train_gail(config: GAILRun) -> None:
-    """Train GAIL into a new run folder."""
+def train(config: Imitation) -> None:
+    """Train a method into a new run folder."""
     config = config.resolved()
     if config.device == "cuda" and not torch.cuda.is_available():
         raise UserError("--device cuda, but torch sees no GPU here; leave it out to train on the CPU")
@@ -57,9 +57,9 @@ def go_on(command: Resume) -> None:
     if command.config is not None:
         if command.out is None:
             raise UserError("--config repeats a run in a new folder: name it with --out FOLDER")
-        config = from_json(GAILRun, files.read_json(command.config), str(command.config))
+        config = from_json(Imitation, files.read_json(command.config), str(command.config))
         check_module(config.env_id, str(command.config))
-        return train_gail(replace(config, out=command.out))
+        return train(replace(config, out=command.out))
     assert command.resume is not None
     if command.out is not None:
         raise UserError(
@@ -70,15 +70,15 @@ def go_on(command: Resume) -> None:
         raise UserError(
             f"{folder.path} trains an expert; go on with: irl experts train --resume {folder.path}"
         )
-    config = from_json(GAILRun, folder.config, str(folder.path / "config.json"))
+    config = from_json(Imitation, folder.config, str(folder.path / "config.json"))
     demos = drawn_again(config, folder)
     torch.set_num_threads(config.threads)
     return play(config, demos, folder)
 
 
-def play(config: GAILRun, demos: Demos, folder: records.RunFolder) -> None:
+def play(config: Imitation, demos: Demos, folder: records.RunFolder) -> None:
     """Train into `folder`, from its last checkpoint where it has one."""
-    algorithm = build.adversarial(config, from_episodes(demos.episodes))
+    algorithm = build.imitation(config, demos.episodes)
     player = Player(
         algorithm,
         folder,
@@ -92,7 +92,7 @@ def play(config: GAILRun, demos: Demos, folder: records.RunFolder) -> None:
     print(f"trained; judge it with: irl evaluate {folder.path}", file=sys.stderr)
 
 
-def _snapshot(config: GAILRun, demos: Demos, algorithm: Adversarial, path: Path) -> None:
+def _snapshot(config: Imitation, demos: Demos, algorithm: Adversarial | Interleaved, path: Path) -> None:
     """The policy, and the reward that the round just done was rewarded by; untrained at step 0."""
     learner, discriminator = algorithm.learner, algorithm.discriminator
     assert isinstance(discriminator, GAIL)

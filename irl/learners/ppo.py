@@ -13,6 +13,7 @@ standard deviation of their discounted return; the exported policy may be a movi
 w' <- c w' + (1 - c) w after each round (Polyak & Juditsky 1992 average iterates; here with a window).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -151,8 +152,14 @@ class PPOLearner:
         assert isinstance(extractor, NormalisedFeatures)
         return extractor.normaliser
 
-    def start(self, reward: RewardFn) -> None:
-        """Nothing: a rollout is rewarded after it is collected."""
+    def start(self, reward: RewardFn, before_update: Callable[[Transitions], None] | None = None) -> None:
+        """Nothing: a rollout is rewarded after it is collected.
+
+        Raises:
+            ValueError: `before_update` is given; PPO has no replay memory to draw batches from.
+        """
+        if before_update is not None:
+            raise ValueError("PPO draws no batches from a replay memory; use SAC")
 
     def collect(self) -> Transitions:
         """One rollout of the current policy, time-major; actions as the environment saw them."""

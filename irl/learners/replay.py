@@ -33,6 +33,7 @@ class Replay:
         self._end_of = torch.full((self._rows,), -1, dtype=torch.int32, device=device)
         self._ends = torch.zeros(16, obs_size, **make)
         self._free = list(range(16))
+        self._terminations = 0
         self.added = 0
         """Transitions added since the start."""
 
@@ -52,6 +53,10 @@ class Replay:
         here = self.added % self._rows
         now, after = slice(here, here + self.n_envs), (here + self.n_envs) % self._rows
         self._forget_ends(here)
+        if self.added >= self._rows - self.n_envs:
+            # the oldest rows lose their observation to the newest step below
+            self._terminations -= int(self._terminated[after : after + self.n_envs].sum())
+        self._terminations += int(terminated.sum())
         self._obs[now], self._action[now] = torch.from_numpy(obs), torch.from_numpy(action)
         self._own[now] = torch.from_numpy(own)
         self._terminated[now] = torch.from_numpy(terminated)
@@ -64,8 +69,33 @@ class Replay:
 
     def sample(self, size: int, rng: torch.Generator) -> Transitions:
         """`size` transitions drawn with replacement from `rng`."""
-        drawn = torch.randint(len(self), (size,), generator=rng, device=self.device)
-        return self.rows((drawn + (self.added - len(self))) % self._rows)
+        return self.rows(self._places(torch.randint(len(self), (size,), generator=rng, device=self.device)))
+
+    def sample_absorbing(self, size: int, rng: torch.Generator) -> Transitions:
+        """`size` transitions of what `irl.envs.absorbing.absorb` makes of the memory.
+
+        Nothing more is stored for it: the steps s_abs -> s_abs are all alike, one for each termination.
+        """
+        stored = len(self)
+        drawn = torch.randint(stored + self._terminations, (size,), generator=rng, device=self.device)
+        loop = drawn >= stored
+        batch = self.rows(self._places(drawn.clamp(max=stored - 1)))
+        into = batch.terminated | loop
+        column = loop.unsqueeze(1)
+        return Transitions(
+            batch.obs.masked_fill_(column, 0.0),
+            batch.action.masked_fill_(column, 0.0),
+            batch.next_obs.masked_fill_(into.unsqueeze(1), 0.0),
+            torch.zeros_like(loop),
+            batch.truncated & ~loop,
+            None if batch.reward is None else batch.reward.masked_fill_(loop, 0.0),
+            absorbing=loop,
+            next_absorbing=into,
+        )
+
+    def _places(self, drawn: Tensor) -> Tensor:
+        """Rows of the oldest transition, the one after it, and so on."""
+        return (drawn + (self.added - len(self))) % self._rows
 
     def rows(self, rows: Tensor) -> Transitions:
         """The transitions stored in these rows."""
@@ -110,6 +140,8 @@ class Replay:
         for first, columns in rows.pieces:
             self._restore(first, columns, max(rows.start - first, 0))
         self.added = rows.stop
+        here = torch.arange(len(self), device=self.device)
+        self._terminations = int(self._terminated[self._places(here)].sum())
         self._obs[self._newest()] = state["newest"].to(self.device)
 
     def _newest(self) -> slice:

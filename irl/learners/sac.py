@@ -12,6 +12,8 @@ environments may be stepped at once and updated from less or more than once a st
 may be a moving average of the weights.
 """
 
+import copy
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -28,7 +30,7 @@ from irl.core.nets import Normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
-from irl.learners.features import NormalisedFeatures
+from irl.learners.features import NormalisedFeatures, Spaces, widened
 from irl.learners.replay import Replay
 from irl.learners.sac_update import SACUpdate
 from irl.learners.schedule import learning_rate
@@ -97,9 +99,15 @@ class SACLearner:
         seed: int,
         total_steps: int,
         normaliser: Normaliser | None = None,
+        absorbing_scale: float = 0.0,
         device: str = "cpu",
     ) -> None:
-        """`normaliser` is kept as it is; without one, observations are only clipped."""
+        """`normaliser` is kept as it is; without one, observations are only clipped.
+
+        With `absorbing_scale`, terminations lead into the absorbing state (`irl.envs.absorbing`), which
+        critics see at that distance from the others.
+        """
+        self._absorbing = absorbing_scale > 0
         self.config, self.env_id, self._total_steps = config, env_id, total_steps
         self.venv = RecordingVecEnv(env_id, env_seeds)
         box = self.venv.action_space
@@ -111,7 +119,7 @@ class SACLearner:
         self.model = self._sb3(seed, device)
         self._rng = torch_stream(seed, "sac", device)
         dtype = torch.bfloat16 if config.products == "bfloat16" else torch.float32
-        self._update = SACUpdate(self.model, self._normaliser, self._rng, dtype)
+        self._update = SACUpdate(self.model, self._normaliser, self._rng, dtype, absorbing_scale)
         capacity = min(config.buffer_size, total_steps + config.steps_per_round)
         self.replay = Replay(capacity, config.n_envs, obs_size, len(self._low), device)
         self._average = WeightAverage(_actor_weights(self.model.actor), config.average)
@@ -121,9 +129,12 @@ class SACLearner:
 
     def _sb3(self, seed: int, device: str) -> SAC:
         config = self.config
+        normaliser, env = copy.deepcopy(self._normaliser), Spaces(self.venv, self._absorbing)
+        if self._absorbing:
+            normaliser = widened(normaliser)
         return SAC(
             "MlpPolicy",
-            self.venv,
+            env,
             learning_rate=learning_rate(config.lr, config.lr_schedule),
             buffer_size=1,  # SB3's own memory is not used
             learning_starts=config.learning_starts,
@@ -133,7 +144,7 @@ class SACLearner:
             policy_kwargs={
                 "net_arch": list(config.hidden),
                 "features_extractor_class": NormalisedFeatures,
-                "features_extractor_kwargs": {"normaliser": self._normaliser},
+                "features_extractor_kwargs": {"normaliser": normaliser},
             },
             seed=seed,
             device=device,
@@ -153,9 +164,9 @@ class SACLearner:
         """Return (the environment's own) and length of each episode that ended since the last call."""
         return self.venv.take_finished()
 
-    def start(self, reward: RewardFn) -> None:
-        """Name the reward that every sampled batch is given."""
-        self._reward = reward
+    def start(self, reward: RewardFn, before_update: Callable[[Transitions], None] | None = None) -> None:
+        """Name the reward that every sampled batch is given, and who sees each batch before that."""
+        self._reward, self._before_update = reward, before_update
 
     def collect(self) -> Transitions:
         """The steps of one round; each is followed by its updates once the random ones are over.
@@ -191,7 +202,10 @@ class SACLearner:
         return np.clip(self._update.unscaled(action).cpu().numpy(), self._low, self._high)
 
     def _learn(self) -> None:
-        batch = self.replay.sample(self.config.batch_size, self._rng)
+        draw = self.replay.sample_absorbing if self._absorbing else self.replay.sample
+        batch = draw(self.config.batch_size, self._rng)
+        if self._before_update is not None:
+            self._before_update(batch)
         with torch.no_grad():
             reward = self._reward(batch).float()
         check_finite({"reward of a drawn batch": reward})
@@ -206,6 +220,8 @@ class SACLearner:
     def policy(self) -> Policy:
         """The current policy, exported: a copy that later updates leave alone."""
         weights = {name: weight.numpy().copy() for name, weight in self._average.weights.items()}
+        # nobody acts in the absorbing state, so its indicator is 0 for whoever acts
+        weights["layers.0.weight"] = weights["layers.0.weight"][:, : len(self._normaliser.mean)].copy()
         mean, std = self._normaliser.mean, self._normaliser.std
         weights |= {"obs_mean": mean.cpu().numpy().copy(), "obs_std": std.cpu().numpy().copy()}
         weights |= {"action_low": self._low, "action_high": self._high}

@@ -1,0 +1,93 @@
+"""Adversarial imitation off policy: a discriminator's step before each of the learner's.
+
+each update:  batch  <- replay memory, its terminations led into the absorbing state
+              D      <- one step on (expert, batch)
+              policy <- one step on (batch, D.reward(batch))
+
+Discriminator and learner share the batch. The policy's side of the discriminator's data is the whole
+memory, not the newest policy's steps: no importance weights (Kostrikov et al. 2019, arXiv:1809.02925,
+section 4.1, which reports that leaving them out works well).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+
+from irl.algorithms.adversarial import Discriminator, judge
+from irl.algorithms.loop import Learner, Round
+from irl.core.config import check_at_least
+from irl.core.finite import check_finite, named
+from irl.core.types import Metrics, Transitions
+
+
+@dataclass(frozen=True)
+class InterleavedConfig:
+    """How often the discriminator learns."""
+
+    every: int = 1
+    """Updates of the learner for one of the discriminator."""
+
+    def __post_init__(self) -> None:
+        check_at_least(self, 1, "every")
+
+
+class Interleaved:
+    """The two players on one memory, and the demonstrations they meet over."""
+
+    def __init__(
+        self,
+        learner: Learner,
+        discriminator: Discriminator,
+        expert: Transitions,
+        schedule: InterleavedConfig,
+        rng: torch.Generator,
+    ) -> None:
+        """`expert` goes on in the absorbing state if the learner's batches do; `rng` draws from it."""
+        self.learner, self.discriminator = learner, discriminator
+        self.expert, self.schedule, self.rng = expert, schedule, rng
+        self.index, self._updates = 0, 0
+        self._sums: Metrics = {}
+        learner.start(discriminator.reward, self._before_update)
+
+    def rounds(self, steps: int) -> Iterator[Round]:
+        """Play until `steps` environment steps are taken; the last round may go past them.
+
+        Raises:
+            NotFinite: the discriminator's weights, the reward or the policy's weights are not finite.
+        """
+        while self.learner.env_steps < steps:
+            before = self._updates
+            batch = self.learner.collect()
+            check_finite(named("discriminator", self.discriminator.state_dict()["net"]))
+            taken = self._updates // self.schedule.every - before // self.schedule.every
+            metrics = {name: value / taken for name, value in self._sums.items()} if taken else {}
+            self._sums = {}
+            metrics |= judge(self.discriminator, self.expert, batch)
+            metrics |= self.learner.improve(self.discriminator.reward)
+            self.index += 1
+            yield Round(self.index, self.learner.env_steps, metrics)
+
+    def _before_update(self, batch: Transitions) -> None:
+        self._updates += 1
+        if self._updates % self.schedule.every == 0:
+            expert = self.expert.sample(len(batch), self.rng)
+            for name, value in self.discriminator.update(expert, batch).items():
+                self._sums[name] = self._sums.get(name, 0.0) + value
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything needed to go on, between two rounds."""
+        return {
+            "learner": self.learner.state_dict(),
+            "discriminator": self.discriminator.state_dict(),
+            "rng": self.rng.get_state(),
+            "counts": (self.index, self._updates),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go on where another run of the same settings was."""
+        self.learner.load_state_dict(state["learner"])
+        self.discriminator.load_state_dict(state["discriminator"])
+        self.rng.set_state(state["rng"])
+        self.index, self._updates = state["counts"]
