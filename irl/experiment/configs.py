@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal, TypeVar
 
 from irl.algorithms.adversarial import ScheduleConfig
 from irl.algorithms.interleaved import InterleavedConfig
@@ -12,6 +12,8 @@ from irl.discriminators.gail import GAILConfig
 from irl.envs.tasks import task_name
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
+
+Run = TypeVar("Run", bound="ImitationRun")
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class ImitationRun:
         check_at_least(self, 1, "demo_episodes", "demo_rate", "steps", "threads")
         check_seed(self.seed)
 
-    def resolved(self) -> Self:
+    def resolved(self: Run) -> Run:
         """The same with every default that depends on another setting filled in."""
         task = task_name(self.env_id)
         return replace(

@@ -68,7 +68,7 @@ class SACUpdate:
             next_action, next_log_pi = self.sample(next_obs)
             if next_alive is not None:
                 # the action of s_abs is 0: decided by where the step leads, not by where it starts
-                none = self.scaled(torch.zeros_like(self._center))
+                none = self.scaled(torch.zeros_like(next_action))
                 next_action = torch.where(next_alive.unsqueeze(1) > 0, next_action, none)
             next_q = _q(self._targets, next_obs, next_action).amin(0)
             value = soft_value(next_q, next_log_pi, temperature, next_alive)

@@ -12,7 +12,7 @@ from irl.algorithms.adversarial import ScheduleConfig
 from irl.core.config import from_json, to_json
 from irl.core.errors import UserError
 from irl.discriminators.gail import GAILConfig
-from irl.experiment.configs import ExpertRun, GAILRun, Watch
+from irl.experiment.configs import DACRun, ExpertRun, GAILRun, GAILSACRun, Watch
 from irl.learners.ppo import PPOConfig
 
 
@@ -176,6 +176,7 @@ CHANGED = GAILRun(
     env_id="Ant-v5",
     demos="irl/ant/expert-v0",
     demo_episodes=2,
+    demo_rate=20,
     steps=64,
     seed=9,
     out=Path("runs/x"),
@@ -190,7 +191,9 @@ CHANGED = GAILRun(
 EXPERT = ExpertRun("Hopper-v5", "expert", 10, 1, Path("runs/e"), PPO, WATCH, "cpu", 1)
 
 
-@pytest.mark.parametrize("config", [GAIL, GAIL.resolved(), CHANGED, EXPERT])
+@pytest.mark.parametrize(
+    "config", [GAIL, GAIL.resolved(), CHANGED, EXPERT, GAILSACRun("Hopper-v5"), DACRun("A-v1", steps=5)]
+)
 def test_the_settings_of_a_run_come_back_through_json(config: Any) -> None:
     assert through_json(config) == config
     assert to_json(config)["kind"] == config.KIND

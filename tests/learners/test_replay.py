@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from irl.core import state
 from irl.core.log import Logs
 from irl.core.types import Transitions
+from irl.envs.absorbing import absorb
 from irl.learners.replay import Replay
 
 O, A = 3, 2  # noqa: E741
@@ -93,3 +94,26 @@ def test_a_checkpoint_writes_what_came_since_the_last_one(tmp_path: Path) -> Non
     other = Replay(100, 2, O, A)
     other.load_state_dict(state.load(tmp_path / "7", logs))
     assert everything(other) == everything(replay)
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(n=st.integers(1, 3), capacity=st.integers(2, 12), steps=st.integers(1, 60), seed=st.integers(0, 10**6))
+def test_the_memory_with_an_absorbing_state_is_what_absorb_makes_of_it(
+    n: int, capacity: int, steps: int, seed: int
+) -> None:
+    replay = Replay(capacity, n, O, A)
+    play(replay, steps, seed)
+    every = replay.rows(replay._places(torch.arange(len(replay))))
+    slow = absorb(every)
+    drawn = replay.sample_absorbing(80 * len(slow) + 200, torch.Generator().manual_seed(0))
+    assert set(marked(drawn)) == set(marked(slow))
+    assert drawn.absorbing is not None
+    share = int(every.terminated.sum()) / len(slow)
+    assert float(drawn.absorbing.float().mean()) == pytest.approx(share, abs=0.1)
+
+
+def marked(batch: Transitions) -> list[tuple[float, ...]]:
+    assert batch.absorbing is not None
+    assert batch.next_absorbing is not None
+    flags = zip(batch.absorbing.tolist(), batch.next_absorbing.tolist(), strict=True)
+    return [(*row, *flag) for row, flag in zip(flat(batch), flags, strict=True)]

@@ -121,3 +121,65 @@ def test_the_networks_that_act_are_the_ones_that_were_trained(dtype: torch.dtype
     np.testing.assert_array_equal(
         sb3.predict(obs, deterministic=True)[0], fresh.predict(obs, deterministic=True)[0]
     )
+
+
+def absorbed(update: SACUpdate, batch: Transitions, flags: tuple[bool, bool]) -> Transitions:
+    """The batch with every row from and to where the flags say."""
+    here, there = (torch.full((B,), flag) for flag in flags)
+    never = torch.zeros(B, dtype=torch.bool)
+    return Transitions(
+        batch.obs.masked_fill(here[:, None], 0.0),
+        batch.action.masked_fill(here[:, None], 0.0),
+        batch.next_obs.masked_fill(there[:, None], 0.0),
+        never,
+        never,
+        absorbing=here,
+        next_absorbing=there,
+    )
+
+
+def wide() -> tuple[SAC, SACUpdate]:
+    class Wider(Twisted):
+        observation_space = Box(-np.inf, np.inf, (O + 1,), np.float32)
+
+    sb3 = SAC("MlpPolicy", Wider(), policy_kwargs={"net_arch": [16, 8]}, seed=1, batch_size=B)
+    return sb3, SACUpdate(sb3, Normaliser(O), torch.Generator().manual_seed(0), torch.float32, 10.0)
+
+
+def test_in_the_absorbing_state_actor_and_temperature_learn_nothing_and_critics_do() -> None:
+    (batch, reward), *_ = batches(1)
+    sb3, update = wide()
+    actor = {name: weight.clone() for name, weight in sb3.actor.state_dict().items()}
+    critic = {name: weight.clone() for name, weight in sb3.critic.state_dict().items()}
+    assert isinstance(sb3.log_ent_coef, Tensor)
+    temperature = sb3.log_ent_coef.detach().clone()
+    update(absorbed(update, batch, (True, True)), reward, 1e-3)
+    assert all(torch.equal(weight, actor[name]) for name, weight in sb3.actor.state_dict().items())
+    assert torch.equal(sb3.log_ent_coef.detach(), temperature)
+    assert any(not torch.equal(weight, critic[name]) for name, weight in sb3.critic.state_dict().items())
+
+
+def test_the_target_of_a_step_into_the_absorbing_state_has_no_action_and_no_entropy() -> None:
+    """It is r + gamma min Q'(s_abs, 0), whatever the actor would do there."""
+    (batch, reward), *_ = batches(1)
+    targets = []
+    for actors_bias in (0.0, 5.0):
+        sb3, update = wide()
+        assert isinstance(sb3.actor.mu, torch.nn.Linear)
+        with torch.no_grad():
+            sb3.actor.mu.bias.add_(actors_bias)
+            update.refresh()
+        update(absorbed(update, batch, (False, True)), reward, 1e-3)
+        targets.append({name: w.clone() for name, w in sb3.critic.state_dict().items()})
+    assert all(torch.equal(targets[0][name], targets[1][name]) for name in targets[0])
+    # and with a step that goes on among the living, it is not so
+    differ = []
+    for actors_bias in (0.0, 5.0):
+        sb3, update = wide()
+        assert isinstance(sb3.actor.mu, torch.nn.Linear)
+        with torch.no_grad():
+            sb3.actor.mu.bias.add_(actors_bias)
+            update.refresh()
+        update(absorbed(update, batch, (False, False)), reward, 1e-3)
+        differ.append({name: w.clone() for name, w in sb3.critic.state_dict().items()})
+    assert any(not torch.equal(differ[0][name], differ[1][name]) for name in differ[0])

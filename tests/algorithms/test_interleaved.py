@@ -1,0 +1,93 @@
+"""DAC's loop: one drawn batch for both players, and ends that are worth what the expert makes of them."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import torch
+
+from irl.algorithms.interleaved import Interleaved, InterleavedConfig
+from irl.core.rng import torch_stream
+from irl.core.types import Metrics, Transitions, from_episodes
+from irl.learners.sac import SACConfig, SACLearner
+from tests import pointmass
+
+SMALL = SACConfig(steps_per_round=100, learning_starts=100, batch_size=16, hidden=(16,))
+
+
+class Told:
+    """A discriminator that writes down what it is asked, and rewards by how often it has learned."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[str, Transitions]] = []
+        self.learned = 0
+
+    def logits(self, batch: Transitions) -> torch.Tensor:
+        return torch.zeros(len(batch))
+
+    def reward(self, batch: Transitions) -> torch.Tensor:
+        self.calls.append(("reward", batch))
+        return torch.full((len(batch),), float(self.learned))
+
+    def update(self, expert: Transitions, policy: Transitions) -> Metrics:
+        self.calls.append(("update", policy))
+        assert len(expert) == len(policy)
+        self.learned += 1
+        return {"discriminator/loss": float(self.learned)}
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"net": {}}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        raise AssertionError("not asked")
+
+
+def loop(told: Told, every: int = 1, scale: float = 10.0) -> Interleaved:
+    learner = SACLearner("Cliff-v0", [0], SMALL, seed=0, total_steps=400, absorbing_scale=scale)
+    expert = from_episodes(pointmass.demonstrations(2))
+    return Interleaved(learner, told, expert, InterleavedConfig(every), torch_stream(0, "minibatches"))
+
+
+def test_the_discriminator_learns_from_each_batch_before_it_rewards_it() -> None:
+    told = Told()
+    rounds = list(loop(told).rounds(300))
+    names = [name for name, _ in told.calls]
+    assert names == ["update", "reward"] * 200
+    pairs = list(zip(told.calls[::2], told.calls[1::2], strict=True))
+    assert all(of_update is of_reward for (_, of_update), (_, of_reward) in pairs)
+    # the first round is random; the second's mean is that of 1..100
+    assert "discriminator/loss" not in rounds[0].metrics
+    assert rounds[1].metrics["discriminator/loss"] == pytest.approx(50.5)
+    assert rounds[2].metrics["discriminator/loss"] == pytest.approx(150.5)
+
+
+def test_every_second_update_is_half_as_many() -> None:
+    told = Told()
+    rounds = list(loop(told, every=2).rounds(300))
+    assert told.learned == 100
+    assert rounds[1].metrics["discriminator/loss"] == pytest.approx(25.5)
+
+
+@pytest.mark.parametrize("scale", [0.0, 10.0])
+def test_terminations_lead_into_the_absorbing_state_where_there_is_one(scale: float) -> None:
+    told = Told()
+    list(loop(told, scale=scale).rounds(400))
+    batches = [batch for name, batch in told.calls if name == "update"]
+    if not scale:
+        assert any(batch.terminated.any() for batch in batches)
+        assert all(batch.absorbing is None for batch in batches)
+        return
+    assert not any(batch.terminated.any() for batch in batches)
+    loops = into = 0
+    for batch in batches:
+        assert batch.absorbing is not None
+        assert batch.next_absorbing is not None
+        loops += int(batch.absorbing.sum())
+        into += int((batch.next_absorbing & ~batch.absorbing).sum())
+    # as many steps in s_abs as steps into it, but for the luck of the draw
+    assert 0.5 < loops / into < 2.0
+
+
+def test_settings_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(ValueError, match="every must be at least 1"):
+        replace(InterleavedConfig(), every=0)
