@@ -6,6 +6,7 @@ import numpy as np
 import torch
 
 from irl.algorithms.adversarial import Adversarial, ScheduleConfig
+from irl.algorithms.loop import BeforeUpdate
 from irl.core.nets import fitted_normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions, from_episodes
@@ -25,7 +26,7 @@ class Told:
         self.env_steps, self.reward_scale = 0, 1.0
         self._batch = from_episodes(pointmass.demonstrations(1))
 
-    def start(self, reward: RewardFn) -> None:
+    def start(self, reward: RewardFn, before_update: BeforeUpdate | None = None) -> None:
         self.calls.append("start")
 
     def collect(self) -> Transitions:
