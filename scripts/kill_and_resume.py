@@ -2,8 +2,8 @@
 
     python scripts/kill_and_resume.py --kills 20
 
-Two runs on Hopper-v5: GAIL with PPO, and a SAC expert. Each is killed at `kills` moments drawn over its
-length, resumed after each, and must end with the same weights and the same metrics (but for wall clock).
+Three runs on Hopper-v5: GAIL with PPO, DAC, and a SAC expert. Each is killed at `kills` moments drawn
+over its length, resumed after each, and must end with the same weights and the same metrics (but for wall clock).
 """
 
 import json
@@ -38,7 +38,8 @@ GAIL = (
     "512",
     *WATCH,
 )
-SAC = ("experts", "train", "--env-id", "Hopper-v5", "--algo", "sac", "--steps", "8000", *WATCH)
+DAC = ("train", "dac", "--env-id", "Hopper-v5", "--demo-episodes", "4", "--steps", "3000", *WATCH)
+SAC = ("experts", "train", "--env-id", "Hopper-v5", "--algo", "sac", "--steps", "7000", *WATCH)
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class Settings:
     """How often to kill."""
 
     kills: int = 20
-    """Kills of each of the two runs."""
+    """Kills of each run."""
     seed: int = 0
     """Draws the moments."""
 
@@ -96,15 +97,20 @@ def compare(name: str, start: tuple[str, ...], resume: tuple[str, ...], folder: 
 
 
 def main(settings: Settings) -> None:
-    """Both runs; exit status 1 when one ends differently."""
+    """Every run; exit status 1 when one ends differently."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         run(("demos", "generate", "--env-id", "Hopper-v5", "--episodes", "5"), folder)
         gail = compare("gail", GAIL, ("train", "--resume"), folder, settings)
     with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        run(("demos", "generate", "--env-id", "Hopper-v5", "--episodes", "5"), folder)
+        dac = compare("dac", DAC, ("train", "--resume"), folder, settings)
+    with tempfile.TemporaryDirectory() as temporary:
         words = (*SAC, "--policies-root", "shelf")
-        sac = compare("sac", words, (*words, "--out"), Path(temporary), settings)
-    raise SystemExit(0 if gail and sac else 1)
+        resume = ("experts", "train", "--policies-root", "shelf", "--resume")
+        sac = compare("sac", words, resume, Path(temporary), settings)
+    raise SystemExit(0 if gail and sac and dac else 1)
 
 
 if __name__ == "__main__":
