@@ -76,24 +76,24 @@ def ends(run_folder: Path) -> tuple[dict[str, bytes], list[dict]]:
 
 
 def compare(name: str, start: tuple[str, ...], resume: tuple[str, ...], folder: Path, s: Settings) -> bool:
-    """One run straight through and one killed again and again; whether they end the same."""
+    """One run straight through, and runs killed again and again; whether all end the same."""
     began = time.monotonic()
     run((*start, "--out", "straight"), folder)
     whole_s = time.monotonic() - began
-    # the start-up is short of nothing to lose; the moments are spread over all of it and one round more
-    moments = stream(s.seed, f"kills of {name}").uniform(0.0, whole_s / 3, s.kills)
-    kills, begun = 0, False
-    for moment in moments:
-        words = (*resume, "killed") if begun else (*start, "--out", "killed")
-        if run(words, folder, float(moment)):
-            break
-        kills += 1
-        begun = (folder / "killed" / "config.json").is_file()
-    else:
-        run((*resume, "killed") if begun else (*start, "--out", "killed"), folder)
-    same = ends(folder / "straight") == ends(folder / "killed")
-    print(f"{name}: killed {kills} times, ends {'the same' if same else 'DIFFERENT'}", flush=True)
-    return same
+    # the start-up is short of nothing to lose; the moments are spread over all of it and some rounds more
+    moments = iter(stream(s.seed, f"kills of {name}").uniform(0.0, whole_s / 3, s.kills).tolist())
+    expected, kills, runs, same = ends(folder / "straight"), 0, 0, 0
+    while kills < s.kills:
+        killed, begun, ended = f"killed{runs}", False, False
+        while not ended:
+            words = (*resume, killed) if begun else (*start, "--out", killed)
+            ended = run(words, folder, next(moments, None))
+            kills += not ended
+            begun = (folder / killed / "config.json").is_file()
+        runs += 1
+        same += ends(folder / killed) == expected
+    print(f"{name}: {kills} kills in {runs} runs, {same} of {runs} end as the one not killed", flush=True)
+    return same == runs
 
 
 def main(settings: Settings) -> None:
