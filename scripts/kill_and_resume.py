@@ -3,7 +3,7 @@
     python scripts/kill_and_resume.py --kills 20
 
 Three runs on Hopper-v5: GAIL with PPO, DAC, and a SAC expert. Each is killed at `kills` moments drawn
-over its length, resumed after each, and must end with the same weights and the same metrics (but for wall clock).
+over its length, resumed after each, and must end with the same weights and metrics, but for the clock's.
 """
 
 import json
