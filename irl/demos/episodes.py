@@ -59,23 +59,19 @@ def check_episode(index: int, episode: Episode) -> None:
 
 def _check_links(file: h5py.File, size: int) -> None:
     """Refuse what leads out of the file, and what would fill the memory."""
+    links: list[tuple[str, Any]] = []
+    # only noted here: h5py does not always survive an exception out of a visitor
+    file.visititems_links(lambda name, link: links.append((name, link)))
     total = 0
-
-    def complaint(name: str, link: Any) -> str | None:
-        nonlocal total
+    for name, link in links:
         if not isinstance(link, h5py.HardLink):
-            return f"{name!r:.80} is a link; expected the data themselves"
+            raise ValueError(f"{name!r:.80} is a link; expected the data themselves")
         item = file[name]
         if isinstance(item, h5py.Dataset):
             if item.is_virtual or item.external:
-                return f"{name!r:.80} is kept in another file; expected the data themselves"
+                raise ValueError(f"{name!r:.80} is kept in another file; expected the data themselves")
             # not nbytes, which is computed in 64 bits and may overflow
             total += math.prod(item.shape or ()) * item.dtype.itemsize
-        return None
-
-    # returned, not raised: h5py does not always survive an exception out of a visitor
-    if (found := file.visititems_links(complaint)) is not None:
-        raise ValueError(found)
     if total > max(MOST_BYTES, MOST_TIMES * size):
         raise ValueError(f"it claims to hold {total / 1e9:.1f} GB in a file of {size / 1e6:.1f} MB")
 

@@ -127,8 +127,8 @@ def read_episodes(dataset: Dataset, root: Path | str | None = None) -> list[Epis
     sizes = dataset.obs_space.shape[0], dataset.action_space.shape[0]
     try:
         return read(dataset.path / "data" / DATA, dataset.episodes, sizes, task)
-    # RuntimeError: what h5py says of some damage
-    except (ValueError, LookupError, TypeError, AssertionError, OSError, RuntimeError) as error:
+    # what h5py says of damage, by where it is
+    except (ValueError, LookupError, TypeError, OSError, RuntimeError, SystemError, MemoryError) as error:
         raise _unreadable(dataset.dataset_id, dataset.path, error, root) from error
 
 

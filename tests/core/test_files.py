@@ -111,3 +111,58 @@ def test_the_checksum_is_sha256(tmp_path: Path) -> None:
     # FIPS 180-2, appendix B.1
     assert files.sha256(tmp_path / "a").startswith("ba7816bf8f01cfea414140de5dae2223")
     assert files.sha256(tmp_path / "a") == hashlib.sha256(b"abc").hexdigest()
+
+
+def test_folders_made_for_what_then_failed_go_again(tmp_path: Path) -> None:
+    def fill(path: Path) -> None:
+        with files.new_folder(path):
+            raise RuntimeError("half way")
+
+    with pytest.raises(RuntimeError, match="half way"):
+        fill(tmp_path / "a" / "b" / "c")
+    assert names(tmp_path) == set()
+    (tmp_path / "a").mkdir()
+    with pytest.raises(RuntimeError, match="half way"):
+        fill(tmp_path / "a" / "b" / "c")
+    assert names(tmp_path) == {"a"}
+
+
+def test_a_folder_that_cannot_take_its_place_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files.write_bytes(tmp_path / "a" / "x", b"old")
+    rename, renamed = os.rename, []
+
+    def fail_once(source: Path, target: Path) -> None:
+        renamed.append(target)
+        if len(renamed) == 2:
+            raise OSError("no more")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "rename", fail_once)
+    with pytest.raises(OSError, match="no more"), files.new_folder(tmp_path / "a") as folder:
+        (folder / "x").write_text("new")
+    assert everything(tmp_path) == {"a/x": "old"}
+    assert names(tmp_path) == {"a"}
+
+
+def test_json_without_end_and_keys_that_contradict_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    os.mkfifo(path)
+    with pytest.raises(UserError, match="is not a file"):
+        files.read_json(path)
+    path.unlink()
+    for content, message in (
+        ("[" * 100_000, "nested too deeply"),
+        ('{"b": {"a": 1, "a": 1}}', "named twice: a"),
+        ("1" * 5000, "digits"),
+    ):
+        path.write_text(content)
+        with pytest.raises(UserError, match=message):
+            files.read_json(path)
+
+
+def test_room_is_tried_and_given_back(tmp_path: Path) -> None:
+    files.check_room(tmp_path, 3 * 2**20 + 5)
+    files.check_writable(tmp_path / "deep" / "a")
+    assert names(tmp_path) == set()

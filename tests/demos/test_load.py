@@ -112,3 +112,25 @@ def test_another_task_of_the_same_shapes():
 
 def _demos(episode: Episode, env_id: str | None) -> Demos:
     return Demos((episode,), (), (0,), (), "x-v0", env_id, Path(), None, None)
+
+
+def test_actions_are_held_against_the_bounds_as_float32_stores_them():
+    env = make("Humanoid-v5")
+    low, high = (np.float64(bound) for bound in (-0.4, 0.4))
+    size = 348, 17
+
+    def with_action(value: float) -> Demos:
+        action = np.zeros((1, size[1]))
+        action[0, 3] = value
+        episode = Episode(np.zeros((2, size[0])), action, np.zeros(1), terminated=False, truncated=True)
+        return _demos(episode, "Humanoid-v5")
+
+    # 0.4 is not a float32, and a squashed action is scaled to it in a few roundings
+    for value in (low, high, float(np.float32(high)), high + 1e-7, low - 1e-7):
+        check_task(with_action(value), env)
+    for value in (high + 1e-5, low - 1e-5, 1.0):
+        with pytest.raises(
+            UserError, match=r"episode 0 has the action .* column 3 at step 0; .* -0.4 to 0.4"
+        ):
+            check_task(with_action(value), env)
+    env.close()

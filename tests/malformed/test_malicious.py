@@ -228,6 +228,7 @@ def test_minari_itself_would_run_it(world: Path) -> None:
 def test_a_file_that_leads_elsewhere_is_replaced_not_followed(irl: Command, world: Path) -> None:
     """A run that was unpacked from an archive may hold links; what is written stays in its folder."""
     (world / "mine").write_text("mine")
+    (world / "run" / "evaluation.json").unlink()
     for name in ("evaluation.json", "report.html"):
         os.symlink(world / "mine", world / "run" / name)
     irl(*EVALUATE.split())
