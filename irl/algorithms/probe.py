@@ -5,7 +5,7 @@ on them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -67,9 +67,14 @@ def random_episodes(env_id: str, n_steps: int, seed: int) -> list[Episode]:
 
 
 def read(reward: RewardFn, batch: Transitions) -> Float[np.ndarray, "B"]:
-    """The reward of a batch in float64."""
+    """The reward of each step for itself, in float64.
+
+    What a reward adds at a termination for the time after it (`irl.rewards.tail`) is left out: it is the
+    worth of a hundred steps on one of them, and the hand-written reward has nothing beside it.
+    """
+    steps = replace(batch, terminated=torch.zeros_like(batch.terminated))
     with torch.no_grad():
-        return reward(batch).double().cpu().numpy()
+        return reward(steps).double().cpu().numpy()
 
 
 def read_episodes(reward: RewardFn, episodes: Sequence[Episode]) -> list[Float[np.ndarray, "_"]]:

@@ -10,6 +10,7 @@ from irl.core import files
 from irl.core.records import open_run
 from irl.core.rng import episode_seeds
 from irl.envs.rollouts import rollouts
+from irl.policies import shelf
 from irl.policies.policy import load_policy
 from tests.experiment.conftest import DATASET, QUICK, TASK
 
@@ -47,6 +48,18 @@ def test_numbers_of_a_run(train: Callable[..., Path], irl: Command, capsys: pyte
     assert walked[-1] == pytest.approx(sum(change["total"] ** 0.5 for change in drift["changes"]))
     assert "report.html" in capsys.readouterr().out
     assert "https://" not in (run / "report.html").read_text().split("<script>")[0]
+
+
+def test_a_score_is_against_the_experts_card_and_not_the_demonstrations(
+    train: Callable[..., Path], irl: Command
+) -> None:
+    run = train("run")
+    irl("evaluate", run, "--episodes", "2")
+    references = files.read_json(run / "evaluation.json")["references"]
+    card = shelf.find(TASK).card
+    assert references["expert"]["return_mean"] == card.measured.return_mean
+    assert references["random"]["return_mean"] == card.random_return_mean
+    assert references["demonstrations"]["return_mean"] != card.measured.return_mean
 
 
 def test_evaluation_repeats_itself_and_leaves_the_run_alone(train: Callable[..., Path], irl: Command) -> None:
