@@ -3,19 +3,33 @@
 import copy
 from collections.abc import Sequence
 
+import torch
+
 from irl.algorithms.adversarial import Adversarial
 from irl.algorithms.forward import Forward
 from irl.algorithms.interleaved import Interleaved
-from irl.core.nets import fitted_normaliser
+from irl.core.errors import UserError
+from irl.core.nets import Normaliser, fitted_normaliser
 from irl.core.rng import episode_seeds, stream, torch_stream
 from irl.core.types import Episode, Transitions
 from irl.discriminators.dac import DAC
 from irl.discriminators.gail import GAIL
 from irl.envs.absorbing import subsample
-from irl.experiment.configs import DACRun, ExpertRun, GAILRun, Imitation
+from irl.experiment.configs import DACRun, ExpertRun, GAILRun, Imitation, RetrainRun
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig, SACLearner
+from irl.rewards.artefact import LearnedReward
 from irl.rewards.mujoco import HandWritten
+
+
+def check_device(device: str) -> None:
+    """Refuse a device that is not there.
+
+    Raises:
+        UserError: it is a GPU, and torch sees none.
+    """
+    if device == "cuda" and not torch.cuda.is_available():
+        raise UserError("--device cuda, but torch sees no GPU here; leave it out to train on the CPU")
 
 
 def demonstrations(config: Imitation, episodes: Sequence[Episode]) -> Transitions:
@@ -56,12 +70,28 @@ def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | I
 
 def forward(config: ExpertRun) -> Forward:
     """PPO, with observations normalised as they come, or SAC on the task's own reward."""
+    return Forward(_learner(config), HandWritten())
+
+
+def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
+    """PPO or SAC on a learned reward, with a copy of its normaliser, which stays as it is.
+
+    Terminations lead into the absorbing state if the reward knows one: SAC puts it into its memory, for PPO
+    the reward adds what it pays.
+    """
+    net = copy.deepcopy(reward.net).to(config.device)
+    learner = _learner(config, copy.deepcopy(reward.net.normaliser), net.spec.absorbing_scale)
+    return Forward(learner, LearnedReward(reward.spec, net))
+
+
+def _learner(
+    config: ExpertRun | RetrainRun, normaliser: Normaliser | None = None, absorbing_scale: float = 0.0
+) -> PPOLearner | SACLearner:
+    seeds = episode_seeds(config.seed, "training", config.learner.n_envs)
     run = {"seed": config.seed, "total_steps": config.steps, "device": config.device}
+    run["normaliser"] = normaliser
     match config.learner:
         case PPOConfig() as settings:
-            seeds = episode_seeds(config.seed, "training", settings.n_envs)
-            learner = PPOLearner(config.env_id, seeds, settings, **run)
+            return PPOLearner(config.env_id, seeds, settings, **run)
         case SACConfig() as settings:
-            seeds = episode_seeds(config.seed, "training", settings.n_envs)
-            learner = SACLearner(config.env_id, seeds, settings, **run)
-    return Forward(learner, HandWritten())
+            return SACLearner(config.env_id, seeds, settings, absorbing_scale=absorbing_scale, **run)

@@ -88,7 +88,8 @@ class GAILRun(ImitationRun):
 
 
 # On rewards that move, an update with each step; random actions only until there is a batch or four.
-_OFF_POLICY = SACConfig(learning_starts=1000, products="bfloat16")
+OFF_POLICY = SACConfig(learning_starts=1000, products="bfloat16")
+"""SAC beside a discriminator, or on what one left."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class GAILSACRun(ImitationRun):
     """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
     steps: int = 150_000
     """Environment steps in all."""
-    learner: SACConfig = _OFF_POLICY
+    learner: SACConfig = OFF_POLICY
     discriminator: GAILConfig = field(default_factory=GAILConfig)
     schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
 
@@ -114,7 +115,7 @@ class DACRun(ImitationRun):
     """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
     steps: int = 150_000
     """Environment steps in all."""
-    learner: SACConfig = _OFF_POLICY
+    learner: SACConfig = OFF_POLICY
     discriminator: DACConfig = field(default_factory=DACConfig)
     schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
 
@@ -140,4 +141,28 @@ class ExpertRun:
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "steps", "threads")
+        check_seed(self.seed)
+
+
+@dataclass(frozen=True)
+class RetrainRun:
+    """Reinforcement learning on the frozen reward of a run's snapshot."""
+
+    KIND: ClassVar[str] = "retrain"
+    run: Path
+    """The run whose reward it is."""
+    snapshot: int
+    """Environment steps of that run when the reward was saved."""
+    env_id: str
+    steps: int
+    seed: int
+    out: Path
+    learner: PPOConfig | SACConfig
+    watch: Watch
+    device: Literal["cpu", "cuda"]
+    threads: int
+
+    def __post_init__(self) -> None:
+        check_at_least(self, 1, "steps", "threads")
+        check_at_least(self, 0, "snapshot")
         check_seed(self.seed)

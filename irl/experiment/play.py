@@ -16,13 +16,14 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from irl.algorithms.loop import Learner, Round
+from irl.algorithms.probe import read_episodes
 from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.finite import NotFinite
 from irl.core.metrics import Row
 from irl.core.records import RunFolder, snapshot_steps
 from irl.core.rng import episode_seeds
-from irl.core.types import Metrics
+from irl.core.types import Metrics, RewardFn
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Watch
 from irl.experiment.curves import curves
@@ -31,8 +32,8 @@ from irl.experiment.progress import progress, training_words
 MOST_CHECKPOINTING = 0.02
 """Share of the time that checkpoints may take."""
 
-MAY_CHANGE = ("watch", "out", "datasets_root")
-"""Settings that change no weight: they may be others when a run goes on."""
+MAY_CHANGE = ("watch", "out", "datasets_root", "run")
+"""Settings that change no weight, places among them: they may be others when a run goes on."""
 
 RECENT = 20
 """Training episodes that `return_mean` is the mean of."""
@@ -68,10 +69,11 @@ class Player:
         steps: int,
         seed: int,
         snapshot: Callable[[Path], None],
+        reward: RewardFn | None = None,
     ) -> None:
-        """`snapshot` writes policy and reward into the folder it is given."""
+        """`snapshot` fills the folder it is given. With `reward`, evaluations are judged by that as well."""
         self.algorithm, self.folder, self.watch = algorithm, folder, watch
-        self.env_id, self.steps, self.snapshot = env_id, steps, snapshot
+        self.env_id, self.steps, self.snapshot, self.reward = env_id, steps, snapshot, reward
         self._eval_seeds = episode_seeds(seed, "evaluation while training", watch.eval_episodes)
         self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
         self._wall_s = self._checkpoint_s = self._last_save_s = 0.0
@@ -183,10 +185,14 @@ class Player:
         if self.watch.eval_episodes == 0 or not (last or (every and round_.index % every == 0)):
             return {}
         episodes = rollouts(self.env_id, self.algorithm.learner.policy(), self._eval_seeds)
-        return {
+        seen = {
             "eval_return_mean": float(np.mean([episode.return_ for episode in episodes])),
             "eval_length_mean": float(np.mean([len(episode) for episode in episodes])),
         }
+        if self.reward is not None:
+            learned = [given.sum() for given in read_episodes(self.reward, episodes)]
+            seen["eval_learned_return_mean"] = float(np.mean(learned))
+        return seen
 
     def _snapshots(self, due: list[int]) -> list[int]:
         """Take the snapshot that is due, if one is; return those that are not yet."""

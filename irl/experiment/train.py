@@ -16,7 +16,7 @@ from irl.demos.load import Demos
 from irl.discriminators.gail import GAIL
 from irl.envs.make import check_module
 from irl.experiment import build
-from irl.experiment.configs import ExpertRun, Imitation
+from irl.experiment.configs import ExpertRun, Imitation, RetrainRun
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
 from irl.policies.policy import save_policy
@@ -38,8 +38,7 @@ class Resume:
 def train(config: Imitation) -> None:
     """Train a method into a new run folder."""
     config = config.resolved()
-    if config.device == "cuda" and not torch.cuda.is_available():
-        raise UserError("--device cuda, but torch sees no GPU here; leave it out to train on the CPU")
+    build.check_device(config.device)
     demos = draw(config)
     torch.set_num_threads(config.threads)
     assert config.out is not None
@@ -66,10 +65,11 @@ def go_on(command: Resume) -> None:
             "--resume goes on in its own folder; leave --out away, or repeat the run with --config"
         )
     folder = records.open_run(command.resume)
-    if folder.config.get("kind") == ExpertRun.KIND:
-        raise UserError(
-            f"{folder.path} trains an expert; go on with: irl experts train --resume {folder.path}"
-        )
+    for kind, command_of in ((ExpertRun.KIND, "irl experts train"), (RetrainRun.KIND, "irl retrain")):
+        if folder.config.get("kind") == kind:
+            raise UserError(
+                f"{folder.path} is a run of kind {kind!r}; go on with: {command_of} --resume {folder.path}"
+            )
     config = from_json(Imitation, folder.config, str(folder.path / "config.json"))
     demos = drawn_again(config, folder)
     torch.set_num_threads(config.threads)

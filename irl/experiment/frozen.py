@@ -1,0 +1,86 @@
+"""Which reward a policy is retrained on: read once, written down, and the same ever after."""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+from gymnasium.spaces import Box
+
+from irl.core import files
+from irl.core.differences import without
+from irl.core.errors import UserError
+from irl.core.records import RunFolder, open_run
+from irl.envs.make import make
+from irl.experiment.configs import RetrainRun
+from irl.experiment.snapshots import snapshot_of
+from irl.rewards.artefact import WEIGHTS, LearnedReward, load_reward
+
+RECORD = "reward.json"
+"""Says in the run folder which reward it is."""
+
+
+def frozen(config: RetrainRun, snapshot: Path) -> LearnedReward:
+    """The reward of a snapshot, once it is known to be of the task and the task is known to start.
+
+    Raises:
+        UserError: it is missing, damaged, or of another task; or the task cannot be started.
+    """
+    reward = load_reward(place := snapshot / "reward")
+    env = make(config.env_id)
+    try:
+        takes = reward.spec.net.obs_dim, reward.spec.net.action_dim
+        needs = _size(env.observation_space), _size(box := env.action_space)
+        if reward.spec.env_id != config.env_id or takes != needs:
+            raise UserError(
+                f"the reward in {place} is of {reward.spec.env_id} with observations of {takes[0]} and "
+                f"actions of {takes[1]}; {config.env_id} has {needs[0]} and {needs[1]}: choose the run it "
+                f"belongs to"
+            )
+        env.reset(seed=config.seed)
+        assert isinstance(box, Box)
+        env.step(((box.low + box.high) / 2).astype(box.dtype))
+        return reward
+    finally:
+        env.close()
+
+
+def recorded(config: RetrainRun, reward: LearnedReward, snapshot: Path) -> dict[str, Any]:
+    """What is written down of it."""
+    spec = reward.spec
+    return {
+        "run": config.run.name,
+        "env_steps": config.snapshot,
+        "method": spec.method,
+        "reward_map": spec.reward_map,
+        "absorbing_scale": spec.net.absorbing_scale,
+        "gamma": spec.gamma,
+        "weights_sha256": files.sha256(snapshot / "reward" / WEIGHTS),
+    }
+
+
+def frozen_again(config: RetrainRun, folder: RunFolder) -> LearnedReward:
+    """The reward that the run in `folder` was begun with.
+
+    Raises:
+        UserError: it is gone, or another one now.
+    """
+    if not (config.run / "config.json").is_file():
+        raise UserError(
+            f"{config.run}, whose reward {folder.path} learns from, is not there; put it back, or write its "
+            f"new place into {folder.path / 'config.json'} as run"
+        )
+    _, snapshot = snapshot_of(open_run(config.run), config.snapshot)
+    reward, before = frozen(config, snapshot), files.read_json(record := folder.path / RECORD)
+    now = recorded(config, reward, snapshot)
+    # a run may be renamed
+    if not isinstance(before, dict) or without(before, ("run",)) != without(now, ("run",)):
+        raise UserError(
+            f"{snapshot / 'reward'} is not the reward of {record}, which the run was begun with; put that "
+            f"back, or begin again with another --out"
+        )
+    return reward
+
+
+def _size(space: gym.Space) -> int:
+    # `make` admits flat boxes only
+    return space.shape[0] if space.shape else 0

@@ -1,0 +1,155 @@
+"""`irl retrain`: a fresh policy on the frozen reward of a run, and its return by both rewards.
+
+A reward that was learned beside a policy was good enough for that policy, along its own way. Whether it is a
+reward is another question: what becomes of a policy that has seen neither demonstrations nor discriminator,
+from random weights, on the reward as it stands. The learner sees the learned reward alone; observations are
+normalised as the reward normalises them, by a copy that does not move.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import torch
+import tyro
+
+from irl.core import records
+from irl.core.config import MOST_SEED, check_at_least, check_seed, from_json, to_json
+from irl.core.errors import UserError
+from irl.core.provenance import command_line, environment
+from irl.envs.make import check_module
+from irl.experiment import build
+from irl.experiment.configs import OFF_POLICY, Imitation, RetrainRun, Watch
+from irl.experiment.frozen import RECORD, frozen, frozen_again, recorded
+from irl.experiment.play import Player
+from irl.experiment.retrained import report
+from irl.experiment.snapshots import snapshot_of
+from irl.learners.ppo import PPOConfig
+from irl.learners.sac import SACConfig
+from irl.policies.policy import save_policy
+
+SEED_APART = 1000
+"""The seed is that of the run and this, unless one is typed: no stream of the run is used again."""
+
+
+@dataclass(frozen=True)
+class Retrain:
+    """Train a fresh policy on a run's frozen reward; writes retrain.json into a folder of its own."""
+
+    run: tyro.conf.Positional[Path | None] = None
+    """Run folder whose reward it is."""
+    resume: Path | None = None
+    """Run folder of `irl retrain` to go on with, by its own settings; no other is needed."""
+    snapshot: int | None = None
+    """Step of the snapshot; the last one unless given."""
+    algo: Literal["ppo", "sac"] | None = None
+    """Which learner; the run's own unless given."""
+    steps: int | None = None
+    """Environment steps; as many as the run's unless given."""
+    seed: int | None = None
+    """Seed of everything random; the run's + 1000 unless given."""
+    out: Path | None = None
+    """Run folder; runs/retrain-<run>-<step>-<algo>-s<seed> unless given."""
+    policies_root: Path | None = None
+    """Where the shelf is, whose card gives the score; expert_data/policies unless given."""
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    """How PPO learns; its own defaults, whatever the run had."""
+    sac: SACConfig = OFF_POLICY
+    """How SAC learns; its defaults for imitation, whatever the run had."""
+    watch: Watch = field(default_factory=Watch)
+    device: Literal["cpu", "cuda"] = "cpu"
+    """Where the networks live."""
+    threads: int = 1
+    """Threads of torch's operators."""
+
+    def __post_init__(self) -> None:
+        check_at_least(self, 1, "threads")
+        if (self.run is None) == (self.resume is None):
+            raise ValueError("name the run whose reward it is, or a run to go on with by --resume")
+        if self.steps is not None:
+            check_at_least(self, 1, "steps")
+        if self.seed is not None:
+            check_seed(self.seed)
+
+
+def retrain(command: Retrain) -> None:
+    """Train, then measure by both rewards."""
+    config, folder = _begun(command) if command.resume is None else _resumed(command)
+    torch.set_num_threads(config.threads)
+    reward = frozen_again(config, folder)
+    algorithm = build.on_frozen(config, reward)
+    player = Player(
+        algorithm,
+        folder,
+        config.watch,
+        env_id=config.env_id,
+        steps=config.steps,
+        seed=config.seed,
+        snapshot=lambda path: save_policy(algorithm.learner.policy(), path / "policy.safetensors"),
+        reward=reward,
+    )
+    player.run(to_go_on=f"irl retrain --resume {folder.path}")
+    report(config, folder, reward, command.policies_root)
+
+
+def _begun(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:
+    """A new run folder; nothing is written before everything is read and the task is known to start."""
+    assert command.run is not None
+    source = records.open_run(command.run)
+    its = from_json(Imitation, source.config, str(source.path / "config.json"))
+    check_module(its.env_id, str(source.path / "config.json"))
+    build.check_device(command.device)
+    step, snapshot = snapshot_of(source, command.snapshot)
+    config = _settled(command, its, step)
+    reward = frozen(config, snapshot)
+    there = records.RunFolder(config.out)
+    if (config.out / "config.json").is_file() and there.config.get("kind") == RetrainRun.KIND:
+        raise UserError(
+            f"{config.out} already holds a run; choose another folder with --out, or go on with it: "
+            f"irl retrain --resume {config.out}"
+        )
+    made_by = environment(command_line(), config.device)
+    record = {RECORD: recorded(config, reward, snapshot)}
+    return config, records.create(config.out, to_json(config), made_by, record)
+
+
+def _settled(command: Retrain, its: Any, step: int) -> RetrainRun:
+    """The settings, with what the run decides filled in."""
+    assert command.run is not None
+    algo = command.algo or its.learner.KIND
+    for name, default in (("ppo", PPOConfig()), ("sac", OFF_POLICY)):
+        if name != algo and getattr(command, name) != default:
+            raise UserError(f"--{name}.* are settings of a learner that is not used; choose --algo {name}")
+    seed = (its.seed + SEED_APART) % (MOST_SEED + 1) if command.seed is None else command.seed
+    source = command.run.resolve()
+    return RetrainRun(
+        run=source,
+        snapshot=step,
+        env_id=its.env_id,
+        steps=its.steps if command.steps is None else command.steps,
+        seed=seed,
+        out=command.out or Path("runs") / f"retrain-{source.name}-{step}-{algo}-s{seed}",
+        learner=command.ppo if algo == "ppo" else command.sac,
+        watch=command.watch,
+        device=command.device,
+        threads=command.threads,
+    )
+
+
+def _resumed(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:
+    assert command.resume is not None
+    folder = records.open_run(command.resume)
+    if command != Retrain(resume=command.resume, policies_root=command.policies_root):
+        raise UserError(
+            f"--resume goes on by the settings of {folder.path}; leave the others away, or choose "
+            f"another --out"
+        )
+    where = str(folder.path / "config.json")
+    if (kind := folder.config.get("kind")) != RetrainRun.KIND:
+        raise UserError(
+            f"{folder.path} is a run of kind {kind!r:.40}; go on with: irl train --resume {folder.path}"
+        )
+    config = from_json(RetrainRun, {**folder.config, "out": str(folder.path)}, where)
+    check_module(config.env_id, where)
+    build.check_device(config.device)
+    return config, folder

@@ -1,0 +1,112 @@
+"""What a retrained policy is worth: the task's own return beside the learned one, over the same episodes."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from irl.algorithms.probe import read_episodes
+from irl.core import files
+from irl.core.records import RunFolder
+from irl.core.rng import episode_seeds
+from irl.core.types import Episode
+from irl.envs.rollouts import rollouts
+from irl.experiment.configs import RetrainRun
+from irl.experiment.frozen import RECORD
+from irl.experiment.judge import finite
+from irl.experiment.progress import each_episode, progress
+from irl.policies import shelf
+from irl.policies.card import Card, normalised_score, summary
+from irl.policies.policy import load_policy
+from irl.rewards.artefact import LearnedReward
+
+EPISODES = 20
+"""Episodes of the deterministic policy, whose starts no training and no other evaluation has."""
+
+RESULT = "retrain.json"
+
+UNSCORED = "no expert of the task is on the shelf, or the return is not a finite number"
+
+
+def report(config: RetrainRun, folder: RunFolder, reward: LearnedReward, policies_root: Path | None) -> None:
+    """Play the last snapshot's policy, write `retrain.json`, print a table."""
+    steps, last = list(folder.snapshots().items())[-1]
+    policy = load_policy(last / "policy.safetensors")
+    seeds = episode_seeds(config.seed, "retrained", EPISODES)
+    with progress(f"measuring {config.env_id}", EPISODES, show=config.watch.progress) as done:
+        episodes = rollouts(config.env_id, policy, seeds, each_episode(done))
+    result = {
+        "format": "irl.retrain",
+        "version": 1,
+        "env_id": config.env_id,
+        "reward": files.read_json(folder.path / RECORD),
+        "algorithm": config.learner.KIND,
+        "seed": config.seed,
+        "env_steps": steps,
+        "true": _true(episodes, _card(config.env_id, policies_root)),
+        "learned": _learned(reward, episodes),
+        "episodes": EPISODES,
+        "episode_seeds": seeds,
+    }
+    files.write_json(folder.path / RESULT, result)
+    Console().print(_table(result))
+
+
+def _true(episodes: Sequence[Episode], card: Card | None) -> dict[str, Any]:
+    """Returns by the task's own reward, and what they are of the expert's."""
+    measured = summary(list(episodes))
+    references = (card.random_return_mean, card.measured.return_mean) if card else (None, None)
+    score = normalised_score(measured.return_mean, *references)
+    return {
+        "return_mean": finite(measured.return_mean),
+        "return_std": finite(measured.return_std),
+        "return_min": finite(measured.return_min),
+        "normalised_score": finite(score),
+        "normalised_score_reason": None if np.isfinite(score) else UNSCORED,
+        "random_return_mean": references[0],
+        "expert_return_mean": references[1],
+        "returns": [finite(value) for value in measured.returns],
+        "length_mean": measured.length_mean,
+        "lengths": list(measured.lengths),
+    }
+
+
+def _learned(reward: LearnedReward, episodes: Sequence[Episode]) -> dict[str, Any]:
+    """Returns by the learned reward: sums over an episode's steps, undiscounted."""
+    returns = np.array([float(given.sum()) for given in read_episodes(reward, episodes)])
+    return {
+        "return_mean": finite(float(returns.mean())),
+        "return_std": finite(float(returns.std())),
+        "return_min": finite(float(returns.min())),
+        "returns": [finite(value) for value in returns.tolist()],
+    }
+
+
+def _card(env_id: str, root: Path | None) -> Card | None:
+    known = any((card.env_id, card.level) == (env_id, "expert") for card in shelf.cards(root))
+    return shelf.find(env_id, "expert", root).card if known else None
+
+
+def _table(result: dict[str, Any]) -> Table:
+    reward, true = result["reward"], result["true"]
+    title = escape(
+        f"{result['algorithm']}, {result['env_steps']} steps on the reward of {reward['run']} at step "
+        f"{reward['env_steps']}; {result['episodes']} deterministic episodes"
+    )
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for column in ("return", "mean ± std", "worst", "score"):
+        table.add_column(column, no_wrap=True)
+    for name, score in (("true", true["normalised_score"]), ("learned", None)):
+        row = result[name]
+        spread = f"{_number(row['return_mean'])} ± {_number(row['return_std'])}"
+        table.add_row(name, spread, _number(row["return_min"]), _number(score, 3))
+    return table
+
+
+def _number(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
