@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 
 from irl.core.errors import UserError
-from irl.experiment import demonstrations, evaluate, experts, retrain, train
+from irl.experiment import demonstrations, evaluate, experts, export, retrain, train
 from irl.experiment.configs import DACRun, GAILRun, GAILSACRun
 from irl.experiment.play import Interrupted
 
@@ -27,6 +27,7 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("train",): (train.Resume, train.go_on),
     ("evaluate",): (evaluate.Evaluate, evaluate.evaluate),
     ("retrain",): (retrain.Retrain, retrain.retrain),
+    ("export",): (export.Export, export.export),
     ("experts", "train"): (experts.TrainExpert, experts.train),
     ("experts", "evaluate"): (experts.EvaluateExpert, experts.evaluate),
     ("experts", "list"): (experts.ListExperts, experts.list_experts),
