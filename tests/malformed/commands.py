@@ -5,11 +5,12 @@ from pathlib import Path
 
 from tests.experiment.conftest import DATASET, TASK
 from tests.malformed.damage import Damage, being, cut, flipped, gone, keyed, tensors
-from tests.malformed.table import SHELVED, Case, at
+from tests.malformed.table import SHELVED, SNAPSHOT, Case, at
 
 GENERATE = f"demos generate --env-id {TASK} --dataset-id irl/pointmass/new-v0 --episodes 2"
 TRAIN = f"train gail --env-id {TASK} --out new"
 EVALUATE = "evaluate run"
+RETRAIN, EXPORT = "retrain run --out new", "export run --out new.zip"
 
 
 def card(damage: Damage, *named: str, words: str = GENERATE) -> Case:
@@ -71,6 +72,40 @@ ENVIRONMENTS = {
         ("unbounded actions", ("finite bounds",), (TRAIN,)),
     )
     for words in commands
+}
+
+LAST_POLICY, LAST_REWARD = f"{SNAPSHOT}/policy.safetensors", f"{SNAPSHOT}/reward"
+
+REUSED = {
+    "no snapshot to retrain on": Case(
+        f"{RETRAIN} --snapshot 5", ("no snapshot of step 5", "768", "--snapshot")
+    ),
+    "a reward gone, to retrain on": Case(
+        RETRAIN, ("no reward in", LAST_REWARD), at(f"{LAST_REWARD}/spec.json", gone)
+    ),
+    "a reward of other weights, to retrain on": Case(
+        RETRAIN, (LAST_REWARD, "sha256"), at(f"{LAST_REWARD}/weights.safetensors", flipped)
+    ),
+    "a reward of another task, to retrain on": Case(
+        RETRAIN, ("Hopper-v5", TASK), at(f"{LAST_REWARD}/spec.json", keyed(env_id="Hopper-v5"))
+    ),
+    "settings cut off, to retrain": Case(RETRAIN, ("not readable JSON",), at("run/config.json", cut)),
+    "an environment of a module, to retrain": Case(
+        RETRAIN, ("'evil'", "IRL_ENV_MODULES"), at("run/config.json", keyed(env_id="evil:Env-v0"))
+    ),
+    "raises at reset: retrain": Case(RETRAIN, (TASK, "the reset of", "--debug"), fault="raises at reset"),
+    "raises when made: retrain": Case(RETRAIN, (TASK, "cannot make"), fault="raises when made"),
+    "no environment: export": Case(EXPORT, (TASK, "cannot make"), fault="raises when made"),
+    "retrained into a run": Case("retrain run --out run", ("run already holds a run", "--out")),
+    "retrained below a file": Case("retrain run --out notes.txt/new", ("notes.txt", "a file is where")),
+    "retraining what is no run": Case("retrain policies", ("policies", "holds no run")),
+    "going on with a run as if retrained": Case("retrain --resume run", ("'gail'", "irl train --resume run")),
+    "a policy cut off, to export": Case(EXPORT, (LAST_POLICY, "not a policy"), at(LAST_POLICY, cut)),
+    "a policy gone, to export": Case(EXPORT, ("no policy file", LAST_POLICY), at(LAST_POLICY, gone)),
+    "no snapshot to export": Case(f"{EXPORT} --snapshot 5", ("no snapshot of step 5", "768")),
+    "exported over a file": Case("export run --out notes.txt", ("notes.txt", "--overwrite")),
+    "exported below a file": Case("export run --out notes.txt/new.zip", ("notes.txt",)),
+    "exporting what is no run": Case("export datasets", ("datasets", "holds no run")),
 }
 
 PLACES = {

@@ -18,6 +18,7 @@ PARTS = (
     runs.REST,
     commands.SHELF,
     commands.ENVIRONMENTS,
+    commands.REUSED,
     commands.PLACES,
 )
 TABLE: dict[str, Case] = {name: case for part in PARTS for name, case in part.items()}
