@@ -17,7 +17,10 @@ DECLARED: dict[str, tuple[str, str]] = {
     "length_mean": ("mean length of the last 20 training episodes", "steps"),
     "eval_return_mean": ("mean return of the deterministic policy in its own episodes", "reward"),
     "eval_length_mean": ("mean length of those episodes", "steps"),
-    "eval_learned_return_mean": ("mean over the same episodes of the sum of the learned reward", "reward"),
+    "eval_learned_return_mean": (
+        "mean over the same episodes of the sum of the learned reward, without what s_abs pays",
+        "reward",
+    ),
     "reward/mean": ("mean of the reward given to the learner, before scaling", "reward"),
     "reward/std": ("its standard deviation over the rollout", "reward"),
     "reward/scale": ("running standard deviation of its discounted return, which it is divided by", "reward"),

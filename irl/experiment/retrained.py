@@ -77,7 +77,11 @@ def _true(episodes: Sequence[Episode], card: Card | None) -> dict[str, Any]:
 
 
 def _learned(reward: LearnedReward, episodes: Sequence[Episode]) -> dict[str, Any]:
-    """Returns by the learned reward: sums over an episode's steps, undiscounted."""
+    """Returns by the learned reward: sums over an episode's steps, undiscounted.
+
+    What the absorbing state pays after a termination is left out, as everywhere in an evaluation
+    (`irl.algorithms.probe.read`); a learner is paid it.
+    """
     returns = np.array([float(given.sum()) for given in read_episodes(reward, episodes)])
     return {
         "return_mean": finite(float(returns.mean())),

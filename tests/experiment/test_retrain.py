@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
+from irl.rewards.maps import MAPS
 from tests.experiment.conftest import DATASET, QUICK, TASK
 
 Command = Callable[..., None]
@@ -220,6 +222,24 @@ def test_terminations_lead_into_the_absorbing_state_where_the_reward_knows_one(
     assert len(seen) == 100
     assert not any(bool(batch.terminated.any()) for batch in seen)
     assert any(batch.absorbing is not None and bool(batch.absorbing.any()) for batch in seen) == absorbs
+
+
+@pytest.mark.usefixtures("runs")
+def test_ppo_is_paid_what_the_absorbing_state_pays_where_the_task_ended() -> None:
+    # wild enough to fall off
+    small = PPOConfig(n_envs=2, steps_per_round=1024, batch_size=64, hidden=(8,), log_std_init=1.0)
+    reward = load_reward("dac")
+    algorithm = build.on_frozen(settings(small, "Cliff-v0"), reward)
+    batch = algorithm.learner.collect()
+    algorithm.learner.close()
+    ended = batch.terminated
+    assert ended.any()
+    going_on = replace(batch, terminated=torch.zeros_like(ended))
+    added = algorithm.reward(batch) - algorithm.reward(going_on)
+    gamma, of_absorbing = reward.spec.gamma, MAPS[reward.spec.reward_map](reward.net.of_absorbing())
+    tail = gamma / (1.0 - gamma) * of_absorbing.expand(int(ended.sum()))
+    torch.testing.assert_close(added[ended], tail)
+    assert not added[~ended].any()
 
 
 def test_the_settings_come_back_from_json() -> None:
