@@ -3,10 +3,12 @@
 from typing import Any
 
 import numpy as np
+import pytest
 import torch
 
 from irl.algorithms.adversarial import Adversarial, ScheduleConfig
 from irl.algorithms.loop import BeforeUpdate
+from irl.core.finite import NotFinite
 from irl.core.nets import fitted_normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions, from_episodes
@@ -133,3 +135,16 @@ def test_the_same_seed_gives_the_same_weights_to_the_bit() -> None:
             pass
         ends.append(loop.learner.policy().weights)
     assert all(np.array_equal(ends[0][name], ends[1][name]) for name in ends[0])
+
+
+def test_a_discriminator_that_is_not_finite_stops_the_round_before_it_rewards() -> None:
+    class Broken(Told):
+        def state_dict(self) -> dict[str, Any]:
+            return {"net": {"body.0.weight": torch.tensor([1.0, float("nan")])}}
+
+    told = Broken()
+    expert = from_episodes(pointmass.demonstrations(2))
+    loop = Adversarial(told, told, expert, ScheduleConfig(batch_size=15), torch_stream(0, "minibatches"))
+    with pytest.raises(NotFinite, match=r"^discriminator body\.0\.weight \(1 of 2 numbers"):
+        next(loop.rounds(30))
+    assert "reward" not in told.calls
