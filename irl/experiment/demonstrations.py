@@ -130,8 +130,8 @@ def _table(info: DemosInfo) -> Table:
         "folder": str(info.path),
     }
     for name, value in rows.items():
-        # as text: what a file says is not markup
-        table.add_row(name, Text(value))
+        # what a file says is neither markup, nor for the terminal to obey
+        table.add_row(name, Text("".join(c if c.isprintable() else "?" for c in value)))
     return table
 
 

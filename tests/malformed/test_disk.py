@@ -107,7 +107,7 @@ def test_a_full_disk(world: Path) -> None:
     disks = [world / "disks" / name for name in "abcd"]
     for disk in disks:
         disk.mkdir(parents=True)
-    shutil.copytree(world / "run", disks[3] / "run")
+    shutil.copytree(world / "run", disks[3] / "run", ignore=shutil.ignore_patterns("evaluation.json"))
     before = tree(world / "disks")
     commands = "\n".join(DISKS)
     program = shlex.join([sys.executable, "-c", PROGRAM])

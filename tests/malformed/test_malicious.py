@@ -7,7 +7,7 @@ import os
 import pickle
 import struct
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -142,12 +142,12 @@ def test_a_pickle_that_is_loaded_does_run(world: Path) -> None:
 
 
 @pytest.fixture
-def evil(world: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def evil(world: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """A module that makes the file `ran` when it is imported."""
     (world / "evil.py").write_text("import pathlib\npathlib.Path('ran').touch()\n")
     monkeypatch.syspath_prepend(world)
-    monkeypatch.delitem(sys.modules, "evil", raising=False)
-    return "evil:Env-v0"
+    yield "evil:Env-v0"
+    sys.modules.pop("evil", None)
 
 
 NAMED = {
@@ -176,7 +176,7 @@ def test_a_module_that_the_user_types_or_allows_is_imported(
     refused(lambda: irl("train", "gail", "--env-id", evil), capfd)
     assert (world / "ran").exists()
     (world / "ran").unlink()
-    monkeypatch.delitem(sys.modules, "evil")
+    del sys.modules["evil"]
     monkeypatch.setenv("IRL_ENV_MODULES", "other,evil")
     keyed(env_id=evil)(world / "run" / "config.json")
     refused(lambda: irl("evaluate", "run"), capfd)
@@ -234,3 +234,21 @@ def test_a_file_that_leads_elsewhere_is_replaced_not_followed(irl: Command, worl
     irl(*EVALUATE.split())
     assert (world / "mine").read_text() == "mine"
     assert not (world / "run" / "evaluation.json").is_symlink()
+
+
+def test_what_a_file_says_is_neither_markup_nor_obeyed_by_a_terminal(
+    irl: Command, world: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    for name in ("[/x]", "[link=file:///etc/passwd]here"):
+        keyed(algorithm_name=name)(world / DATA / "metadata.json")
+        keyed(algorithm=name)(world / SHELVED / "card.json")
+        for words in (SHOW, "experts list"):
+            irl(*words.split())
+            assert name in capfd.readouterr().out
+    escapes = "\x1b]0;title\x07\x9b31m\u2028"
+    keyed(algorithm_name=escapes)(world / DATA / "metadata.json")
+    irl(*SHOW.split())
+    assert all(line.isprintable() for line in capfd.readouterr().out.split("\n"))
+    keyed(kind=escapes)(world / "run" / "config.json")
+    assert refused(lambda: irl("evaluate", "run"), capfd).rstrip("\n").isprintable()
