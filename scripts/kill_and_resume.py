@@ -80,14 +80,15 @@ def compare(name: str, start: tuple[str, ...], resume: tuple[str, ...], folder: 
     began = time.monotonic()
     run((*start, "--out", "straight"), folder)
     whole_s = time.monotonic() - began
-    # the start-up is short of nothing to lose; the moments are spread over all of it and some rounds more
-    moments = iter(stream(s.seed, f"kills of {name}").uniform(0.0, whole_s / 3, s.kills).tolist())
+    rng = stream(s.seed, f"kills of {name}")
     expected, kills, runs, same = ends(folder / "straight"), 0, 0, 0
     while kills < s.kills:
         killed, begun, ended = f"killed{runs}", False, False
         while not ended:
             words = (*resume, killed) if begun else (*start, "--out", killed)
-            ended = run(words, folder, next(moments, None))
+            # anywhere, the start-up and the first writes too; what is resumed often ends before its moment
+            moment = float(rng.uniform(0.0, 0.9 * whole_s)) if kills < s.kills else None
+            ended = run(words, folder, moment)
             kills += not ended
             begun = (folder / killed / "config.json").is_file()
         runs += 1
