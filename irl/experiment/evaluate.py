@@ -19,7 +19,7 @@ from irl.core.types import Episode
 from irl.demos.load import Demos
 from irl.envs.make import make
 from irl.envs.rollouts import rollouts
-from irl.experiment.configs import GAILRun
+from irl.experiment.configs import Imitation
 from irl.experiment.draw import drawn_again
 from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.progress import each_episode, progress
@@ -67,7 +67,7 @@ def evaluate(command: Evaluate) -> None:
 
 def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     """The content of `evaluation.json`."""
-    config = from_json(GAILRun, folder.config, str(folder.path / "config.json"))
+    config = from_json(Imitation, folder.config, str(folder.path / "config.json"))
     if not (snapshots := folder.snapshots()):
         raise UserError(
             f"{folder.path} has no snapshot; go on with: irl train --resume {folder.path}, or where it is "
