@@ -17,7 +17,7 @@ from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment, versions
 from irl.core.rng import episode_seeds
-from irl.envs.make import make
+from irl.envs.make import check_module, make
 from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import ExpertRun, Watch
@@ -134,7 +134,10 @@ def _resumed(command: TrainExpert) -> ExpertRun:
         raise UserError(
             f"{folder.path} is a run of kind {kind!r}; go on with: irl train --resume {folder.path}"
         )
-    return from_json(ExpertRun, {**folder.config, "out": str(folder.path)}, str(folder.path / "config.json"))
+    where = str(folder.path / "config.json")
+    run = from_json(ExpertRun, {**folder.config, "out": str(folder.path)}, where)
+    check_module(run.env_id, where)
+    return run
 
 
 def _expert_run(command: TrainExpert) -> ExpertRun:

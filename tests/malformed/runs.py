@@ -1,10 +1,14 @@
 """Run folders that cannot be judged or gone on with."""
 
+import json
 import os
 from pathlib import Path
 
 import numpy as np
 
+from irl.core.config import to_json
+from irl.experiment.configs import ExpertRun, Watch
+from irl.learners.ppo import PPOConfig
 from tests.malformed.damage import (
     Damage,
     a_folder,
@@ -72,6 +76,12 @@ def nan_reward(weights: dict[str, np.ndarray]) -> None:
     weights["body.0.weight"][0, 0] = np.nan
 
 
+def an_expert_of_a_module(path: Path) -> None:
+    learner, watch = PPOConfig(), Watch()
+    run = ExpertRun("evil:Env-v0", "expert", 64, 0, Path("run"), learner, watch, "cpu", 1)
+    path.write_text(json.dumps(to_json(run)))
+
+
 SETTINGS = {
     "no settings": config(gone, "holds no run"),
     "no settings to go on with": config(gone, "holds no run", words=RESUME),
@@ -110,6 +120,9 @@ SETTINGS = {
     ),
     "an environment of a module, to go on": config(keyed(env_id="evil:Env-v0"), "'evil'", words=RESUME),
     "an environment of a module, to judge": config(keyed(env_id="evil:Env-v0"), "IRL_ENV_MODULES=evil"),
+    "an environment of a module, of an expert": config(
+        an_expert_of_a_module, "IRL_ENV_MODULES=evil", words="experts train --resume run"
+    ),
     "another task in the settings": Case(
         EVALUATE, ("Hopper-v5", "11", "2"), at("run/config.json", keyed(env_id="Hopper-v5"))
     ),
