@@ -66,6 +66,9 @@ class Logs:
         Raises:
             UserError: a piece is missing, or is not what was written.
         """
+        if not name.isidentifier():
+            # it comes from a file, and becomes part of a path
+            raise UserError(f"{name!r:.80} is not the name of a log")
         pieces, known = [], []
         for first, last, digest in segments:
             path = self._path(name, int(first), int(last))

@@ -66,3 +66,9 @@ def test_a_damaged_piece_is_said(damage: str, tmp_path: Path) -> None:
         path.write_bytes(bytes(content) if damage == "flipped" else bytes(content[:-5]))
     with pytest.raises(UserError, match=r"numbers-.* is damaged"):
         Logs(tmp_path).load("numbers", 0, 10, segments)
+
+
+def test_a_name_that_would_lead_elsewhere_is_refused(tmp_path: Path) -> None:
+    (segment,) = Logs(tmp_path / "a").append(log(0, 10))
+    with pytest.raises(UserError, match="is not the name of a log"):
+        Logs(tmp_path / "b").load("../a/numbers", 0, 10, [segment])

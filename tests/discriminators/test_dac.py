@@ -72,7 +72,7 @@ def test_between_two_gaussians_the_logit_is_the_log_ratio_of_their_densities() -
 
 def test_the_defaults_are_dacs_and_survive_json() -> None:
     c = DACConfig()
-    assert (c.hidden, c.activation, c.lr, c.gradient_penalty) == ((256, 256), "tanh", 3e-4, 10.0)
+    assert (c.hidden, c.activation, c.lr, c.gradient_penalty) == ((128, 128), "tanh", 3e-4, 10.0)
     assert (c.penalty_center, c.penalty_every, c.reward_map, c.absorbing_scale) == (1.0, 1, "logit", 10.0)
     assert (c.entropy, c.spectral_norm) == (0.0, False)
     changed = replace(c, reward_map="fairl", penalty_center=0.0, spectral_norm=True)
