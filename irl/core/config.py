@@ -28,6 +28,19 @@ def check_at_least(config: object, least: int, *names: str) -> None:
             raise ValueError(f"{name} must be at least {least}, not {value}")
 
 
+MOST_THREADS = 1024
+
+
+def check_threads(threads: int) -> None:
+    """Refuse a number of threads that no machine here has: torch would try to start them.
+
+    Raises:
+        ValueError: it is below 1 or above 1024.
+    """
+    if not 1 <= threads <= MOST_THREADS:
+        raise ValueError(f"threads must be in 1 to {MOST_THREADS}, not {threads}")
+
+
 def check_seed(seed: int) -> None:
     """Refuse a seed that some generator would not take.
 

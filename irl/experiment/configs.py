@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, TypeVar
 
 from irl.algorithms.adversarial import ScheduleConfig
 from irl.algorithms.interleaved import InterleavedConfig
-from irl.core.config import check_at_least, check_seed
+from irl.core.config import check_at_least, check_seed, check_threads
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
 from irl.envs.tasks import task_name
@@ -64,7 +64,8 @@ class ImitationRun:
     """Threads of torch's operators; results are the same to the bit only at the same number."""
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "demo_episodes", "demo_rate", "steps", "threads")
+        check_at_least(self, 1, "demo_episodes", "demo_rate", "steps")
+        check_threads(self.threads)
         check_seed(self.seed)
 
     def resolved(self: Run) -> Run:
@@ -140,7 +141,8 @@ class ExpertRun:
     threads: int
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "steps", "threads")
+        check_at_least(self, 1, "steps")
+        check_threads(self.threads)
         check_seed(self.seed)
 
 
@@ -163,6 +165,7 @@ class RetrainRun:
     threads: int
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "steps", "threads")
+        check_at_least(self, 1, "steps")
+        check_threads(self.threads)
         check_at_least(self, 0, "snapshot")
         check_seed(self.seed)

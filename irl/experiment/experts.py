@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from irl.core import records
-from irl.core.config import check_at_least, check_seed, from_json, to_json
+from irl.core.config import check_at_least, check_seed, check_threads, from_json, to_json
 from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment, versions
@@ -62,7 +62,7 @@ class TrainExpert:
     """Threads of torch's operators."""
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "threads")
+        check_threads(self.threads)
         check_seed(self.seed)
         shelf.check_level(self.level)
         if not self.env_id and self.resume is None:

@@ -14,7 +14,7 @@ import torch
 import tyro
 
 from irl.core import records
-from irl.core.config import MOST_SEED, check_at_least, check_seed, from_json, to_json
+from irl.core.config import MOST_SEED, check_at_least, check_seed, check_threads, from_json, to_json
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
 from irl.envs.make import check_module
@@ -63,7 +63,7 @@ class Retrain:
     """Threads of torch's operators."""
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "threads")
+        check_threads(self.threads)
         if (self.run is None) == (self.resume is None):
             raise ValueError("name the run whose reward it is, or a run to go on with by --resume")
         if self.steps is not None:

@@ -223,3 +223,9 @@ def test_a_run_that_contradicts_itself_is_the_users_to_mend() -> None:
 def test_the_value_of_a_float_is_kept_to_the_bit() -> None:
     config = replace(GAIL, discriminator=GAILConfig(lr=math.nextafter(1e-3, 1)))
     assert through_json(config).discriminator.lr == math.nextafter(1e-3, 1)
+
+
+def test_more_threads_than_any_machine_has_are_refused() -> None:
+    for threads in (0, -1, 1025, 10**9):
+        with pytest.raises(ValueError, match=f"threads must be in 1 to 1024, not {threads}"):
+            GAILRun("Hopper-v5", threads=threads)
