@@ -169,10 +169,15 @@ def open_run(path: Path) -> RunFolder:
     """The run in a folder.
 
     Raises:
-        UserError: there is none.
+        UserError: there is none, or something in it is a link: what is written and deleted here must be here.
     """
     if not (path / "config.json").is_file():
         raise UserError(f"{path} holds no run: there is no {path / 'config.json'}")
+    for inside in (*path.iterdir(), *(path / "checkpoint").glob("*")):
+        if inside.is_symlink():
+            raise UserError(
+                f"{inside} is a link to {os.readlink(inside)}; put the real files there, or remove it"
+            )
     return RunFolder(path)
 
 

@@ -179,3 +179,12 @@ def test_snapshots_are_due_at_the_ends_the_quarters_and_the_halvings(total: int,
 def test_snapshot_steps_of_the_quickstart() -> None:
     expected = [0, 3_840, 7_680, 15_360, 30_720, 61_440, 122_880, 184_320, 245_760]
     assert snapshot_steps(245_760) == expected
+
+
+@pytest.mark.parametrize("name", ["checkpoint", "snapshots", "metrics.jsonl", "checkpoint/logs"])
+def test_a_run_that_leads_elsewhere_is_not_opened(run: RunFolder, tmp_path: Path, name: str) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (run.path / name).parent.mkdir(exist_ok=True)
+    (run.path / name).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(UserError, match=rf"{name} is a link to .*elsewhere"):
+        open_run(run.path)
