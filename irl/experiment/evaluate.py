@@ -24,7 +24,7 @@ from irl.experiment.draw import drawn_again
 from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
-from irl.policies.card import Card, normalised_score, summary
+from irl.policies.card import normalised_score, summary
 from irl.policies.policy import Policy, check_policy, load_policy
 from irl.report.html import write_report
 from irl.report.tables import evaluation_table
@@ -164,7 +164,7 @@ def _policy(episodes: Sequence[Episode], references: dict[str, Any]) -> dict[str
 
 def _references(env_id: str, demos: Demos, policies_root: Path | None) -> dict[str, Any]:
     """Returns to compare with: from the expert's card, else from the dataset, else unknown."""
-    card = _card(env_id, policies_root)
+    card = shelf.expert_card(env_id, policies_root)
     expert = random = None
     if card is not None:
         source = f"card of {card.env_id} {card.level}"
@@ -185,9 +185,3 @@ def _references(env_id: str, demos: Demos, policies_root: Path | None) -> dict[s
     shown = {"return_mean": finite(measured.return_mean), "return_std": finite(measured.return_std)}
     shown |= {"episodes": measured.episodes, "source": f"dataset {demos.dataset_id}"}
     return {"expert": expert, "random": random, "demonstrations": shown}
-
-
-def _card(env_id: str, root: Path | None) -> Card | None:
-    known = any((card.env_id, card.level) == (env_id, "expert") for card in shelf.cards(root))
-    # a shelf that holds a damaged expert is an error, one without it is not
-    return shelf.find(env_id, "expert", root).card if known else None

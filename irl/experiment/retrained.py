@@ -48,7 +48,7 @@ def report(config: RetrainRun, folder: RunFolder, reward: LearnedReward, policie
         "algorithm": config.learner.KIND,
         "seed": config.seed,
         "env_steps": steps,
-        "true": _true(episodes, _card(config.env_id, policies_root)),
+        "true": _true(episodes, shelf.expert_card(config.env_id, policies_root)),
         "learned": _learned(reward, episodes),
         "episodes": EPISODES,
         "episode_seeds": seeds,
@@ -89,11 +89,6 @@ def _learned(reward: LearnedReward, episodes: Sequence[Episode]) -> dict[str, An
         "return_min": finite(float(returns.min())),
         "returns": [finite(value) for value in returns.tolist()],
     }
-
-
-def _card(env_id: str, root: Path | None) -> Card | None:
-    known = any((card.env_id, card.level) == (env_id, "expert") for card in shelf.cards(root))
-    return shelf.find(env_id, "expert", root).card if known else None
 
 
 def _table(result: dict[str, Any]) -> Table:

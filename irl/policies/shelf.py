@@ -106,3 +106,13 @@ def _load(path: Path, card: Card) -> Shelved:
             f"train again with: irl experts train --env-id {card.env_id} --overwrite"
         )
     return Shelved(policy, card, path)
+
+
+def expert_card(env_id: str, root: Path | None = None) -> Card | None:
+    """The card of a task's expert, None where the shelf has none.
+
+    Raises:
+        UserError: there is one, and it is damaged.
+    """
+    known = any((card.env_id, card.level) == (env_id, "expert") for card in cards(root))
+    return find(env_id, "expert", root).card if known else None

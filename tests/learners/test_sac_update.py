@@ -162,24 +162,18 @@ def test_in_the_absorbing_state_actor_and_temperature_learn_nothing_and_critics_
 def test_the_target_of_a_step_into_the_absorbing_state_has_no_action_and_no_entropy() -> None:
     """It is r + gamma min Q'(s_abs, 0), whatever the actor would do there."""
     (batch, reward), *_ = batches(1)
-    targets = []
-    for actors_bias in (0.0, 5.0):
+
+    def critics(leads_into_absorbing: bool, actors_bias: float) -> dict[str, Tensor]:
         sb3, update = wide()
         assert isinstance(sb3.actor.mu, torch.nn.Linear)
         with torch.no_grad():
             sb3.actor.mu.bias.add_(actors_bias)
             update.refresh()
-        update(absorbed(update, batch, (False, True)), reward, 1e-3)
-        targets.append({name: w.clone() for name, w in sb3.critic.state_dict().items()})
-    assert all(torch.equal(targets[0][name], targets[1][name]) for name in targets[0])
+        update(absorbed(update, batch, (False, leads_into_absorbing)), reward, 1e-3)
+        return sb3.critic.state_dict()
+
+    into, other = critics(True, 0.0), critics(True, 5.0)
+    assert all(torch.equal(into[name], other[name]) for name in into)
     # and with a step that goes on among the living, it is not so
-    differ = []
-    for actors_bias in (0.0, 5.0):
-        sb3, update = wide()
-        assert isinstance(sb3.actor.mu, torch.nn.Linear)
-        with torch.no_grad():
-            sb3.actor.mu.bias.add_(actors_bias)
-            update.refresh()
-        update(absorbed(update, batch, (False, False)), reward, 1e-3)
-        differ.append({name: w.clone() for name, w in sb3.critic.state_dict().items()})
-    assert any(not torch.equal(differ[0][name], differ[1][name]) for name in differ[0])
+    on, other = critics(False, 0.0), critics(False, 5.0)
+    assert any(not torch.equal(on[name], other[name]) for name in on)
