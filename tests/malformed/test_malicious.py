@@ -225,15 +225,19 @@ def test_minari_itself_would_run_it(world: Path) -> None:
     assert (world / "ran").exists()
 
 
-def test_a_file_that_leads_elsewhere_is_replaced_not_followed(irl: Command, world: Path) -> None:
+def test_a_file_that_leads_elsewhere_is_refused_not_followed(
+    irl: Command, world: Path, capfd: pytest.CaptureFixture
+) -> None:
     """A run that was unpacked from an archive may hold links; what is written stays in its folder."""
     (world / "mine").write_text("mine")
     (world / "run" / "evaluation.json").unlink()
     for name in ("evaluation.json", "report.html"):
         os.symlink(world / "mine", world / "run" / name)
-    irl(*EVALUATE.split())
+    with pytest.raises(SystemExit) as stopped:
+        irl(*EVALUATE.split())
+    assert stopped.value.code == 2
+    assert "is a link to" in capfd.readouterr().err
     assert (world / "mine").read_text() == "mine"
-    assert not (world / "run" / "evaluation.json").is_symlink()
 
 
 def test_what_a_file_says_is_neither_markup_nor_obeyed_by_a_terminal(
