@@ -67,7 +67,7 @@ class SACConfig:
     """Width of each hidden layer of actor and critics, ReLU between."""
     products: Literal["float32", "bfloat16"] = "float32"
     """Number format of hidden layers' products. bfloat16 is faster where the CPU has it, and rounds to
-    three digits: results differ from float32's as two seeds do."""
+    three digits: results differ from float32's, and what that does to a return is not measured yet."""
     average: float = 0.0
     """Decay a round of the moving average of weights that is exported; 0 exports the newest."""
 
