@@ -2,7 +2,7 @@
 
     mlp:         x -> W_n act(... act(W_1 x + b_1) ...) + b_n
     spectral:    x -> W x / sigma(W) + b
-    normaliser:  x -> clip((x - mean) / std, -10, 10)
+    normaliser:  x -> clip((x - mean) / std, -c, c), c = 10
 
 Weights are drawn from a generator that the caller hands in, never from the global stream.
 """
@@ -20,6 +20,9 @@ ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
 CLIP = 10.0
 """Bound of a normalised observation, in standard deviations."""
+
+NO_CLIP = float(torch.finfo(torch.float32).max)
+"""A bound that no float32 passes."""
 
 MIN_STD = 1e-6
 """An observation that varies less is constant, and is only centred: its noise says nothing."""
@@ -84,7 +87,7 @@ def mlp(
 
 
 class Normaliser(nn.Module):
-    """Observations in standard deviations from their mean, clipped at +-10.
+    """Observations in standard deviations from their mean, clipped.
 
     Fixed unless `update` is called, which merges a batch into the running moments.
     """
@@ -93,8 +96,10 @@ class Normaliser(nn.Module):
     var: Tensor
     count: Tensor
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, clip: float = CLIP) -> None:
+        """`clip` is the bound, in standard deviations."""
         super().__init__()
+        self.clip = clip
         self.register_buffer("mean", torch.zeros(size))
         self.register_buffer("var", torch.ones(size))
         self.register_buffer("count", torch.zeros((), dtype=torch.float64))
@@ -106,7 +111,7 @@ class Normaliser(nn.Module):
         return torch.where(std < MIN_STD, torch.ones_like(std), std)
 
     def forward(self, obs: Float[Tensor, "B O"]) -> Float[Tensor, "B O"]:
-        return ((obs - self.mean) / self.std).clamp(-CLIP, CLIP)
+        return ((obs - self.mean) / self.std).clamp(-self.clip, self.clip)
 
     @torch.no_grad()
     def update(self, obs: Float[Tensor, "B O"]) -> None:

@@ -9,16 +9,18 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor
 
-from irl.core.nets import Normaliser
+from irl.core.nets import CLIP, Normaliser
 
 
 class NormalisedFeatures(BaseFeaturesExtractor):
     """Features of an observation: the observation, normalised."""
 
-    def __init__(self, observation_space: Box, normaliser: Normaliser | None = None) -> None:
-        """`normaliser` is used as it is; without one, a fresh one is."""
+    def __init__(
+        self, observation_space: Box, normaliser: Normaliser | None = None, clip: float = CLIP
+    ) -> None:
+        """`normaliser` is used as it is; without one, a fresh one is, with this bound."""
         super().__init__(observation_space, features_dim=observation_space.shape[0])
-        self.normaliser = normaliser or Normaliser(observation_space.shape[0])
+        self.normaliser = normaliser or Normaliser(observation_space.shape[0], clip)
 
     def forward(self, obs: Float[Tensor, "B O"]) -> Float[Tensor, "B O"]:
         """Normalised observations."""
@@ -38,7 +40,7 @@ class Spaces(gym.Env):
 
 def widened(normaliser: Normaliser) -> Normaliser:
     """The same with one number more, which stays as it is."""
-    wider = Normaliser(len(normaliser.mean) + 1).to(normaliser.mean.device)
+    wider = Normaliser(len(normaliser.mean) + 1, normaliser.clip).to(normaliser.mean.device)
     wider.mean.copy_(torch.cat([normaliser.mean, normaliser.mean.new_zeros(1)]))
     wider.var.copy_(torch.cat([normaliser.var, normaliser.var.new_ones(1)]))
     return wider

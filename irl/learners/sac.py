@@ -7,9 +7,9 @@ The networks are those of Stable-Baselines3's `SAC`; stepping and updating are i
 Each batch asks the `RewardFn` when it is drawn, so no stored reward can go stale; a time limit is no
 termination.
 
-Differs from the paper: observations are clipped at +-10 standard deviations, as `Policy` does; several
-environments may be stepped at once and updated from less or more than once a step; the exported policy
-may be a moving average of the weights.
+Differs from the paper: observations may be normalised, and are clipped then; several environments may be
+stepped at once and updated from less or more than once a step; the exported policy may be a moving
+average of the weights.
 """
 
 import copy
@@ -26,7 +26,7 @@ from torch import Tensor, nn
 
 from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
-from irl.core.nets import Normaliser
+from irl.core.nets import CLIP, NO_CLIP, Normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
@@ -102,7 +102,7 @@ class SACLearner:
         absorbing_scale: float = 0.0,
         device: str = "cpu",
     ) -> None:
-        """`normaliser` is kept as it is; without one, observations are only clipped.
+        """`normaliser` is kept as it is; without one, networks see observations as they are.
 
         With `absorbing_scale`, terminations lead into the absorbing state (`irl.envs.absorbing`), which
         critics see at that distance from the others.
@@ -115,7 +115,7 @@ class SACLearner:
         self._low, self._high = box.low, box.high
         assert self.venv.observation_space.shape is not None
         obs_size = self.venv.observation_space.shape[0]
-        self._normaliser = (normaliser or Normaliser(obs_size)).to(device)
+        self._normaliser = (normaliser or Normaliser(obs_size, NO_CLIP)).to(device)
         self.model = self._sb3(seed, device)
         self._rng = torch_stream(seed, "sac", device)
         dtype = torch.bfloat16 if config.products == "bfloat16" else torch.float32
@@ -224,6 +224,8 @@ class SACLearner:
         weights["layers.0.weight"] = weights["layers.0.weight"][:, : len(self._normaliser.mean)].copy()
         mean, std = self._normaliser.mean, self._normaliser.std
         weights |= {"obs_mean": mean.cpu().numpy().copy(), "obs_std": std.cpu().numpy().copy()}
+        if self._normaliser.clip != CLIP:
+            weights["obs_clip"] = np.float32(self._normaliser.clip)
         weights |= {"action_low": self._low, "action_high": self._high}
         sizes = (len(mean), len(self._low))
         return Policy(

@@ -12,7 +12,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
 from torch import Tensor, nn
 
-from irl.core.nets import CLIP, Normaliser
+from irl.core.nets import Normaliser
 from irl.core.types import Metrics, Transitions
 from irl.learners.relu_net import ReLUNet, linear_layers
 from irl.learners.sac_losses import actor_loss, critic_loss, soft_value, squashed, td_target, temperature_loss
@@ -35,7 +35,7 @@ class SACUpdate:
         absorbing state, else 0.
         """
         self.model, self.rng, self._scale = model, rng, absorbing_scale
-        self._mean, self._std = normaliser.mean, normaliser.std
+        self._mean, self._std, self._clip = normaliser.mean, normaliser.std, normaliser.clip
         actor, device = model.actor, model.device
         assert isinstance(actor.mu, nn.Linear)
         assert isinstance(actor.log_std, nn.Linear)
@@ -97,7 +97,7 @@ class SACUpdate:
         self, obs: Float[Tensor, "B O"], absorbing: Bool[Tensor, "B"] | None = None
     ) -> Float[Tensor, "B F"]:
         """Normalised observations, zeros in s_abs, and its indicator; the moments are read once."""
-        normal = ((obs - self._mean) / self._std).clamp_(-CLIP, CLIP)
+        normal = ((obs - self._mean) / self._std).clamp_(-self._clip, self._clip)
         if not self._scale:
             return normal
         if absorbing is None:

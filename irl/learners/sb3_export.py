@@ -20,7 +20,7 @@ from gymnasium.spaces import Box
 from stable_baselines3 import PPO, SAC
 from torch import Tensor
 
-from irl.core.nets import ACTIVATIONS, MIN_STD
+from irl.core.nets import ACTIVATIONS, CLIP, MIN_STD
 from irl.learners.features import NormalisedFeatures
 from irl.policies.policy import Policy
 
@@ -52,6 +52,7 @@ def _untrained(policy: Policy, observations: Box, actions: Box) -> PPO | SAC:
         "net_arch": list(policy.spec.hidden),
         "activation_fn": ACTIVATIONS[policy.spec.activation],
         "features_extractor_class": NormalisedFeatures,
+        "features_extractor_kwargs": {"clip": float(policy.weights.get("obs_clip", CLIP))},
     }
     algorithm = ALGORITHMS[policy.spec.distribution]
     model = algorithm("MlpPolicy", None, policy_kwargs=shape, device="cpu", _init_setup_model=False)  # pyright: ignore[reportArgumentType]

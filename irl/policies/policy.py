@@ -1,6 +1,6 @@
 """A trained policy as a few numpy arrays: acting needs no learner and no tensor.
 
-    x = clip((obs - mean) / std, -10, 10);  m = mlp(x)
+    x = clip((obs - mean) / std, -c, c);  m = mlp(x)
     gaussian:           action = clip(m, low, high)
     squashed_gaussian:  action = low + (tanh(m) + 1) / 2 * (high - low)
 
@@ -47,7 +47,7 @@ class Policy:
 
     Weights are `layers.<i>.weight (out, in)`, `layers.<i>.bias`, `log_std (A,)` or, for a
     state-dependent one, `log_std.weight (A, H)` and `log_std.bias`, `obs_mean`, `obs_std (O,)`,
-    `action_low` and `action_high (A,)`.
+    `action_low` and `action_high (A,)`, and `obs_clip ()` unless the bound is 10.
     """
 
     def __init__(self, spec: PolicySpec, weights: dict[str, np.ndarray]) -> None:
@@ -60,6 +60,7 @@ class Policy:
         ]
         self._activation = _ACTIVATIONS[spec.activation]
         self._low, self._high = self.weights["action_low"], self.weights["action_high"]
+        self._clip = self.weights.get("obs_clip", np.float32(CLIP))
 
     def __repr__(self) -> str:
         s = self.spec
@@ -79,7 +80,7 @@ class Policy:
 
     def _features(self, obs: np.ndarray) -> np.ndarray:
         x = (obs - self.weights["obs_mean"]) / self.weights["obs_std"]
-        x = np.minimum(np.maximum(x, -CLIP), CLIP).astype(np.float32)
+        x = np.minimum(np.maximum(x, -self._clip), self._clip).astype(np.float32)
         for weight, bias in self._layers[:-1]:
             x = self._activation(weight @ x + bias)
         return x
@@ -107,6 +108,8 @@ class Policy:
         sizes = (spec.obs_dim, *spec.hidden, spec.action_dim)
         expected: dict[str, tuple[int, ...]] = {"obs_mean": sizes[:1], "obs_std": sizes[:1]}
         expected |= {"action_low": sizes[-1:], "action_high": sizes[-1:]}
+        if "obs_clip" in self.weights:
+            expected["obs_clip"] = ()
         for i, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
             expected |= {f"layers.{i}.weight": (outputs, inputs), f"layers.{i}.bias": (outputs,)}
         if "log_std" in self.weights:
@@ -184,8 +187,9 @@ def _check_values(weights: dict[str, np.ndarray]) -> None:
             finite = np.isfinite(values.astype(np.float32)).all()
         if not finite:
             raise ValueError(f"{name} has values that are not finite")
-    if "obs_std" in weights and (weights["obs_std"] <= 0.0).any():
-        raise ValueError("obs_std has values that are not positive")
+    for name in ("obs_std", "obs_clip"):
+        if name in weights and (weights[name] <= 0.0).any():
+            raise ValueError(f"{name} has values that are not positive")
     if {"action_low", "action_high"} <= weights.keys():
         low, high = weights["action_low"], weights["action_high"]
         if low.shape == high.shape and (low > high).any():
