@@ -1,7 +1,7 @@
 """The discriminator of discriminator-actor-critic (Kostrikov et al. 2019, arXiv:1809.02925).
 
     D  <-  argmin  -E_expert[w log D(s,a)] / E_expert[w] - E_replay[log(1 - D(s,a))]     (losses.bce)
-                   + 10 E[(|grad logit(x)| - 1)^2]                        (regularisers.gradient_penalty)
+                   + 10 E[(|grad logit(x)| - 1)^2]                        (regularisers.slope_penalty)
     r  =   log D(s,a) - log(1 - D(s,a)) = logit(s,a)                      (maps.logit)
 
 over steps that go on in the absorbing state s_abs (envs.absorbing), whose reward is learned like any
@@ -39,5 +39,3 @@ class DACConfig(GAILConfig):
 
 class DAC(GAIL):
     """A classifier that knows the absorbing state, updated once an environment step."""
-
-    fused = True

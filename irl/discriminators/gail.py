@@ -1,7 +1,7 @@
 """Generative adversarial imitation learning (Ho & Ermon 2016, arXiv:1606.03476).
 
     D  <-  argmin  -E_expert[log D(s,a)] - E_policy[log(1 - D(s,a))]          (losses.bce)
-                   + c E[(|grad logit(x)| - 1)^2]                             (regularisers.gradient_penalty)
+                   + c E[(|grad logit(x)| - 1)^2]                             (regularisers.slope_penalty)
     r  =   -log(1 - D(s,a))                                                   (maps.gail)
 
 Differs from the paper: the expert has label 1 (the paper has 0); the gradient penalty (the paper has
@@ -21,6 +21,7 @@ from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
 from irl.core.types import Metrics, Transitions
 from irl.discriminators import losses, regularisers
+from irl.discriminators.slopes import Slopes
 from irl.rewards import tail
 from irl.rewards.nets import LogitNet, LogitSpec
 
@@ -50,6 +51,8 @@ class GAILConfig:
     """Divide each layer by its largest singular value: the slope of the logit is then at most 1."""
     absorbing_scale: float = 0.0
     """Distance of the absorbing state from all others; 0: there is none."""
+    products: Literal["float32", "bfloat16"] = "float32"
+    """Number format of what hidden layers exchange while D learns. bfloat16 rounds to three digits."""
 
     def __post_init__(self) -> None:
         check_at_least(self, 0, "lr", "gradient_penalty", "penalty_center", "entropy", "absorbing_scale")
@@ -58,9 +61,6 @@ class GAILConfig:
 
 class GAIL:
     """A classifier of (s, a) into expert and policy, and the reward it gives."""
-
-    fused = False
-    """Whether Adam is one kernel: 0.3 ms less an update, and other roundings."""
 
     def __init__(
         self,
@@ -80,7 +80,9 @@ class GAIL:
         self.config, self.rng, self.gamma, self.reward_map = config, rng, gamma, config.reward_map
         shape = (config.hidden, config.activation, config.absorbing_scale, config.spectral_norm)
         self.net = LogitNet(LogitSpec(obs_dim, action_dim, *shape), normaliser, init_rng).to(rng.device)
-        self.optimizer = torch.optim.Adam(self.net.parameters(), lr=config.lr, fused=self.fused or None)
+        dtype = torch.bfloat16 if config.products == "bfloat16" else torch.float32
+        self._slopes = Slopes(self.net, dtype)
+        self.optimizer = torch.optim.Adam(self._slopes.trained, lr=config.lr, fused=True)
         self._updates, self._penalty = 0, 0.0
 
     def logits(self, batch: Transitions) -> Float[Tensor, "B"]:
@@ -94,27 +96,24 @@ class GAIL:
 
     def update(self, expert: Transitions, policy: Transitions) -> Metrics:
         """One gradient step on a batch of each. Returns the loss before it and the last penalty taken."""
-        self.net.iterate()
+        c, n = self.config, len(expert)
         expert_x, policy_x = self.net.inputs(expert), self.net.inputs(policy)
-        of_expert, of_policy = self.net.of_inputs(expert_x), self.net.of_inputs(policy_x)
-        loss = losses.bce(of_expert, of_policy, expert.weight, policy.weight)
-        total = loss + self._regularisation(expert_x, policy_x, torch.cat([of_expert, of_policy]))
+        penalised = c.gradient_penalty > 0 and self._updates % c.penalty_every == 0
+        sloped = regularisers.between(expert_x, policy_x, self.rng) if penalised else expert_x[:0]
+        logits, slopes = self._slopes(torch.cat([expert_x, policy_x]), sloped)
+        loss = total = losses.bce(logits[:n], logits[n:], expert.weight, policy.weight)
+        if penalised:
+            penalty = regularisers.slope_penalty(slopes, c.penalty_center)
+            total = total + c.gradient_penalty * c.penalty_every * penalty
+            self._penalty = penalty.item()
+        if c.entropy:
+            total = total - c.entropy * losses.entropy_bonus(logits)
         self.optimizer.zero_grad(set_to_none=True)
         total.backward()
         self.optimizer.step()
+        self._slopes.refresh()
         self._updates += 1
         return {"discriminator/loss": loss.item(), "discriminator/gradient_penalty": self._penalty}
-
-    def _regularisation(
-        self, expert_x: Float[Tensor, "B I"], policy_x: Float[Tensor, "C I"], logits: Float[Tensor, "D"]
-    ) -> Float[Tensor, ""]:
-        c, sum_ = self.config, logits.new_zeros(())
-        if c.gradient_penalty and self._updates % c.penalty_every == 0:
-            logit, center = self.net.of_inputs, c.penalty_center
-            penalty = regularisers.gradient_penalty(logit, expert_x, policy_x, self.rng, center)
-            sum_ = c.gradient_penalty * c.penalty_every * penalty
-            self._penalty = penalty.item()
-        return sum_ - c.entropy * losses.entropy_bonus(logits) if c.entropy else sum_
 
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on."""
@@ -129,6 +128,7 @@ class GAIL:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Go on where another one of the same settings was."""
         self.net.load_state_dict(state["net"])
+        self._slopes.refresh()
         self.optimizer.load_state_dict(state["optimizer"])
         self.rng.set_state(state["rng"])
         self._updates, self._penalty = state["updates"], state["penalty"]

@@ -198,7 +198,7 @@ class SACLearner:
     @torch.no_grad()
     def _act(self) -> np.ndarray:
         obs = torch.as_tensor(self.venv.obs, dtype=torch.float32, device=self.model.device)
-        action, _ = self._update.sample(self._update.features(obs))
+        action = self._update.sample(self._update.features(obs))
         return np.clip(self._update.unscaled(action).cpu().numpy(), self._low, self._high)
 
     def _learn(self) -> None:

@@ -1,8 +1,9 @@
 """One update of Stable-Baselines3's SAC networks, faster than its own `train`.
 
 With float32 products the weights after an update are those of `SAC.train` within rounding; a test
-holds it. What makes it faster: critics are not differentiated in the actor's step, the networks are
-`ReLUNet`s, Adam is fused, and hidden products may be in bfloat16.
+holds it. What makes it faster: gradients are written out (`sac_gradients`), the critics are one stack of
+networks and are not differentiated in the actor's step, the actor sees both ends of a step at once, Adam
+is fused, and hidden products may be in bfloat16.
 """
 
 import torch
@@ -12,10 +13,12 @@ from stable_baselines3 import SAC
 from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
 from torch import Tensor, nn
 
+from irl.core.flat import linear_layers
 from irl.core.nets import Normaliser
 from irl.core.types import Metrics, Transitions
-from irl.learners.relu_net import ReLUNet, linear_layers
-from irl.learners.sac_losses import actor_loss, critic_loss, soft_value, squashed, td_target, temperature_loss
+from irl.learners import sac_gradients as gradients
+from irl.learners.relu_stack import ReLUStack
+from irl.learners.sac_losses import actor_loss, critic_loss, soft_value, squashed, td_target
 
 
 class SACUpdate:
@@ -40,58 +43,68 @@ class SACUpdate:
         assert isinstance(actor.mu, nn.Linear)
         assert isinstance(actor.log_std, nn.Linear)
         assert isinstance(model.log_ent_coef, Tensor)
-        self._actor = ReLUNet(linear_layers(actor.latent_pi), [actor.mu, actor.log_std], dtype)
-        self._critics = [_value_net(net, dtype) for net in model.critic.q_networks]
-        self._targets = [_value_net(net, dtype) for net in model.critic_target.q_networks]
-        self._log_temperature = model.log_ent_coef
-        trained = ([self._actor.flat], [net.flat for net in self._critics], [self._log_temperature])
-        self.optimizers = [torch.optim.Adam(weights, fused=True) for weights in trained]
+        self._actor = ReLUStack([linear_layers(actor.latent_pi)], [[actor.mu, actor.log_std]], dtype)
+        self._critics = _value_nets(model.critic.q_networks, dtype)
+        self._targets = _value_nets(model.critic_target.q_networks, dtype)
+        self._log_temperature = model.log_ent_coef.detach()
+        self._log_temperature.grad = torch.zeros_like(self._log_temperature)
+        trained = (self._actor.flat, self._critics.flat, self._log_temperature)
+        self.optimizers = [torch.optim.Adam([weights], fused=True) for weights in trained]
         box = model.action_space
         assert isinstance(box, Box)
         self._center = torch.as_tensor((box.high + box.low) / 2, device=device)
         self._half = torch.as_tensor((box.high - box.low) / 2, device=device)
-        self._losses: dict[str, Tensor] = {}
+        self._last: dict[str, Tensor | None] = {}
 
+    @torch.no_grad()
     def __call__(self, batch: Transitions, reward: Float[Tensor, "B"], lr: float) -> None:
         """Temperature, critics, actor, then the target critics follow. Actions in environment units."""
         for optimizer in self.optimizers:
             optimizer.param_groups[0]["lr"] = lr
         of_actor, of_critics, of_temperature = self.optimizers
-        alive, next_alive = _alive(batch.absorbing), _alive(batch.next_absorbing)
+        size, alive, next_alive = len(batch), _alive(batch.absorbing), _alive(batch.next_absorbing)
         obs = self.features(batch.obs, batch.absorbing)
         next_obs = self.features(batch.next_obs, batch.next_absorbing)
-        temperature = self._log_temperature.detach().exp().squeeze()
-        action, log_pi = self.sample(obs)
-        wanted = float(self.model.target_entropy)
-        _step(of_temperature, temperature_loss(self._log_temperature, log_pi, wanted, alive))
-        with torch.no_grad():
-            next_action, next_log_pi = self.sample(next_obs)
-            if next_alive is not None:
-                # the action of s_abs is 0: decided by where the step leads, not by where it starts
-                none = self.scaled(torch.zeros_like(next_action))
-                next_action = torch.where(next_alive.unsqueeze(1) > 0, next_action, none)
-            next_q = _q(self._targets, next_obs, next_action).amin(0)
-            value = soft_value(next_q, next_log_pi, temperature, next_alive)
-            target = td_target(reward, value, batch.terminated, self.model.gamma)
-        critics = critic_loss(_q(self._critics, obs, self.scaled(batch.action)), target)
-        _step(of_critics, critics, *self._critics)
-        value = _q(self._critics, obs, action, frozen=True).amin(0)
-        actor = actor_loss(value, log_pi, temperature, alive)
-        _step(of_actor, actor, self._actor)
-        self._follow()
-        losses = {"actor_loss": actor.detach(), "critic_loss": critics.detach(), "ent_coef": temperature}
-        self._losses = losses
+        temperature = self._log_temperature.exp().squeeze()
 
-    @torch.no_grad()
-    def _follow(self) -> None:
-        for target, net in zip(self._targets, self._critics, strict=True):
-            target.flat.lerp_(net.flat, self.model.tau)
-            target.refresh()
+        outputs, activations = self._actor(torch.cat([obs, next_obs]))
+        action, log_pi, moved = self._sampled(outputs[0, :size])
+        next_action, next_log_pi, _ = self._sampled(outputs[0, size:])
+        shares = gradients.shares(log_pi, alive)
+        wanted = float(self.model.target_entropy)
+        torch.sum(-shares * (log_pi + wanted), 0, keepdim=True, out=self._log_temperature.grad)
+        of_temperature.step()
+
+        if next_alive is not None:
+            # the action of s_abs is 0: decided by where the step leads, not by where it starts
+            none = self.scaled(torch.zeros_like(next_action))
+            next_action = torch.where(next_alive.unsqueeze(1) > 0, next_action, none)
+        next_q = self._targets(torch.cat([next_obs, next_action], 1))[0].squeeze(2).amin(0)
+        value = soft_value(next_q, next_log_pi, temperature, next_alive)
+        target = td_target(reward, value, batch.terminated, self.model.gamma)
+        qs, seen = self._critics(torch.cat([obs, self.scaled(batch.action)], 1))
+        self._critics.differentiate(gradients.of_critics(qs.squeeze(2), target).unsqueeze(2), seen)
+        of_critics.step()
+        self._critics.refresh()
+
+        values, seen = self._critics(torch.cat([obs, action], 1))
+        of_values = gradients.of_values(values.squeeze(2), shares).unsqueeze(2)
+        of_action = self._critics.into_inputs(of_values, seen)[:, :, obs.shape[1] :].sum(0)
+        of_mean, of_log_std = gradients.of_squashed(action, moved, of_action, temperature * shares)
+        of_log_std = of_log_std * _within_bounds(outputs[0, :size].chunk(2, 1)[1])
+        of_outputs = torch.cat([of_mean, of_log_std], 1).unsqueeze(0)
+        self._actor.differentiate(of_outputs, [h[:, :size] for h in activations])
+        of_actor.step()
+        self._actor.refresh()
+        self._targets.flat.lerp_(self._critics.flat, self.model.tau)
+        self._targets.refresh()
+        self._last = {"qs": qs.squeeze(2), "target": target, "values": values.squeeze(2).amin(0)}
+        self._last |= {"log_pi": log_pi, "temperature": temperature, "alive": alive}
 
     def refresh(self) -> None:
         """Call it after the weights were loaded."""
-        for net in (self._actor, *self._critics, *self._targets):
-            net.refresh()
+        for nets in (self._actor, self._critics, self._targets):
+            nets.refresh()
 
     def features(
         self, obs: Float[Tensor, "B O"], absorbing: Bool[Tensor, "B"] | None = None
@@ -107,13 +120,29 @@ class SACUpdate:
 
     def metrics(self) -> Metrics:
         """What the last update was like."""
-        return {f"sac/{name}": float(value) for name, value in self._losses.items()}
+        if not self._last:
+            return {}
+        last = self._last
+        of_actor = actor_loss(last["values"], last["log_pi"], last["temperature"], last["alive"])  # pyright: ignore[reportArgumentType]
+        of_critics = critic_loss(last["qs"], last["target"])  # pyright: ignore[reportArgumentType]
+        return {
+            "sac/actor_loss": float(of_actor),
+            "sac/critic_loss": float(of_critics),
+            "sac/ent_coef": float(last["temperature"]),  # pyright: ignore[reportArgumentType]
+        }
 
-    def sample(self, features: Float[Tensor, "B F"]) -> tuple[Float[Tensor, "B A"], Float[Tensor, "B"]]:
-        """Actions within [-1, 1] for normalised observations, and their log pi."""
-        mean, log_std = self._actor(features).chunk(2, dim=1)
+    def sample(self, features: Float[Tensor, "B F"]) -> Float[Tensor, "B A"]:
+        """Actions within [-1, 1] for normalised observations."""
+        return self._sampled(self._actor(features)[0][0])[0]
+
+    def _sampled(
+        self, outputs: Float[Tensor, "B C"]
+    ) -> tuple[Float[Tensor, "B A"], Float[Tensor, "B"], Float[Tensor, "B A"]]:
+        """Actions, their log pi, and how far the noise moved them before the squashing."""
+        mean, log_std = outputs.chunk(2, dim=1)
         noise = torch.randn(mean.shape, generator=self.rng, device=mean.device)
-        return squashed(mean, log_std.clamp(LOG_STD_MIN, LOG_STD_MAX), noise)
+        log_std = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
+        return *squashed(mean, log_std, noise), log_std.exp() * noise
 
     def scaled(self, action: Float[Tensor, "B A"]) -> Float[Tensor, "B A"]:
         """Environment units to [-1, 1]."""
@@ -128,19 +157,10 @@ def _alive(absorbing: Bool[Tensor, "B"] | None) -> Float[Tensor, "B"] | None:
     return None if absorbing is None else (~absorbing).float()
 
 
-def _value_net(net: nn.Module, dtype: torch.dtype) -> ReLUNet:
-    *body, last = linear_layers(net)
-    return ReLUNet(body, [last], dtype)
+def _value_nets(nets: nn.ModuleList | list[nn.Module], dtype: torch.dtype) -> ReLUStack:
+    layers = [linear_layers(net) for net in nets]
+    return ReLUStack([of_one[:-1] for of_one in layers], [of_one[-1:] for of_one in layers], dtype)
 
 
-def _q(nets: list[ReLUNet], obs: Tensor, action: Tensor, frozen: bool = False) -> Float[Tensor, "N B"]:
-    x = torch.cat([obs, action], 1)
-    return torch.stack([net(x, frozen).squeeze(1) for net in nets])
-
-
-def _step(optimizer: torch.optim.Optimizer, loss: Tensor, *nets: ReLUNet) -> None:
-    optimizer.zero_grad()
-    loss.backward()
-    optimizer.step()
-    for net in nets:
-        net.refresh()
+def _within_bounds(log_std: Float[Tensor, "B A"]) -> Bool[Tensor, "B A"]:
+    return (log_std >= LOG_STD_MIN) & (log_std <= LOG_STD_MAX)
