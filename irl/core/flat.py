@@ -7,7 +7,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 
-def flattened(parameters: Sequence[nn.Parameter]) -> Float[Tensor, "P"]:
+def flattened(parameters: Sequence[Tensor]) -> Float[Tensor, "P"]:
     """The parameters' numbers in a row. From now on they are views of it: who changes one changes both."""
     flat = torch.cat([p.detach().reshape(-1) for p in parameters])
     for parameter, view in zip(parameters, views(flat, [p.shape for p in parameters]), strict=True):

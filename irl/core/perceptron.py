@@ -10,7 +10,7 @@ bfloat16. What touches inputs or outputs, and every gradient of a weight, is flo
 one tensor (`irl.core.flat`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -18,20 +18,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from irl.core.flat import flattened, views
-
-
-def _of_tanh(g: Tensor, h: Tensor) -> Tensor:
-    return torch.ops.aten.tanh_backward(g, h)
-
-
-def _of_relu(g: Tensor, h: Tensor) -> Tensor:
-    return torch.ops.aten.threshold_backward(g, h, 0)
-
-
-_PHI: dict[str, tuple[Callable[[Tensor], Tensor], Callable[[Tensor, Tensor], Tensor]]] = {
-    "tanh": (torch.Tensor.tanh_, _of_tanh),
-    "relu": (torch.Tensor.relu_, _of_relu),
-}
+from irl.core.phi import PHI
 
 
 class Perceptron:
@@ -45,7 +32,7 @@ class Perceptron:
         self.flat = flattened(parameters).requires_grad_()
         """Every weight and bias; what an optimiser is given."""
         self.dtype = dtype
-        self.phi, self.times_slope = _PHI[activation]
+        self.phi, self.times_slope = PHI[activation]
         self.bends = activation == "tanh"
         shapes = [p.shape for p in parameters]
         self.gradient = torch.zeros_like(self.flat.detach())

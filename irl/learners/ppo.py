@@ -25,11 +25,12 @@ from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
 from irl.core.config import check_at_least
-from irl.core.finite import NotFinite, check_finite, named
-from irl.core.nets import Normaliser
+from irl.core.finite import check_finite, named
+from irl.core.nets import ACTIVATIONS, Normaliser
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
+from irl.learners.ppo_update import PPOUpdate
 from irl.learners.random_state import read_global, write_global
 from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
@@ -39,7 +40,11 @@ from irl.rewards.normalise import ReturnScale
 
 @dataclass(frozen=True)
 class PPOConfig:
-    """How the policy is improved."""
+    """How the policy is improved: the keywords of SB3's PPO.
+
+    `learning_rate` is `lr` with its schedule, `n_steps` is `steps_per_round` / `n_envs`, `policy_kwargs` are
+    `hidden` and `log_std_init`. There is no `use_sde`: an exported policy has no such noise.
+    """
 
     KIND: ClassVar[str] = "ppo"
     n_envs: int = 16
@@ -60,10 +65,22 @@ class PPOConfig:
     """Weight of longer advantage estimates."""
     clip_range: float = 0.2
     """How far a probability ratio may move."""
+    clip_range_vf: float | None = None
+    """How far the value may move in an update; None leaves it free."""
+    normalize_advantage: bool = True
+    """Advantages of a minibatch at mean 0 and deviation 1."""
     ent_coef: float = 0.0
     """Weight of the entropy bonus."""
+    vf_coef: float = 0.5
+    """Weight of the value's loss."""
+    max_grad_norm: float = 0.5
+    """Longest gradient; a longer one is shortened to it."""
+    target_kl: float | None = None
+    """Passes stop once the policy is 1.5 times this far from where it was; None never stops them."""
     hidden: tuple[int, ...] = (64, 64)
-    """Width of each hidden layer of policy and value, tanh between."""
+    """Width of each hidden layer of policy and value."""
+    activation: Literal["tanh", "relu"] = "tanh"
+    """Between those layers."""
     log_std_init: float = -0.5
     """Logarithm of the first standard deviation of the actions."""
     average: float = 0.0
@@ -71,7 +88,10 @@ class PPOConfig:
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "n_epochs")
-        check_at_least(self, 0, "lr", "clip_range")
+        check_at_least(self, 0, "lr", "clip_range", "vf_coef", "max_grad_norm")
+        for name in ("clip_range_vf", "target_kl"):
+            if (value := getattr(self, name)) is not None and value <= 0.0:
+                raise ValueError(f"{name} must be above 0, or None, not {value}")
         if self.steps_per_round % self.n_envs or self.steps_per_round % self.batch_size:
             raise ValueError(
                 f"steps_per_round ({self.steps_per_round}) must be a multiple of n_envs ({self.n_envs}) "
@@ -117,10 +137,15 @@ class PPOLearner:
             gamma=config.gamma,
             gae_lambda=config.gae_lambda,
             clip_range=config.clip_range,
+            clip_range_vf=config.clip_range_vf,
+            normalize_advantage=config.normalize_advantage,
             ent_coef=config.ent_coef,
+            vf_coef=config.vf_coef,
+            max_grad_norm=config.max_grad_norm,
+            target_kl=config.target_kl,
             policy_kwargs={
                 "net_arch": list(config.hidden),
-                "activation_fn": nn.Tanh,
+                "activation_fn": ACTIVATIONS[config.activation],
                 "log_std_init": config.log_std_init,
                 "features_extractor_class": NormalisedFeatures,
                 "features_extractor_kwargs": {"normaliser": normaliser},
@@ -128,7 +153,9 @@ class PPOLearner:
             seed=seed,
             device=device,
         )
+        # without one SB3 makes a folder for its own
         self.model.set_logger(Logger(folder=None, output_formats=[]))
+        self._update = PPOUpdate(self.model, config.activation)
         self._average = WeightAverage(_actor_weights(self.model), config.average)
         _, self._callback = self.model._setup_learn(total_steps, callback=None)
 
@@ -179,30 +206,26 @@ class PPOLearner:
             raise RuntimeError("collect a rollout before improving on it")
         batch, self._batch = self._batch, None
         raw = self._give_rewards(batch, reward)
-        # SB3's train() reads the remaining progress for its schedules
-        self.model._update_current_progress_remaining(self.env_steps, self.total_steps)
-        self._train()
+        metrics = self._train()
         self._average.update(_actor_weights(self.model))
         if self._running:
             # after the gradient steps: within a round, old and new log pi see one normaliser
             self._normaliser.update(batch.obs)
-        return self._metrics() | {
+        return metrics | {
             "reward/mean": float(raw.mean()),
             "reward/std": float(raw.std()),
             "reward/scale": self._scale.std,
         }
 
-    def _train(self) -> None:
-        weights = self.model.policy.state_dict()
-        try:
-            self.model.train()
-        except ValueError as error:
-            # torch's distributions refuse a mean that is not finite; the weights may still be, and be huge
-            check_finite(named("policy", weights))
-            if "constraint" in str(error):
-                raise NotFinite("policy's mean of the actions") from error
-            raise
-        check_finite(named("policy", weights))
+    def _train(self) -> Metrics:
+        model = self.model
+        # the schedules of rate and clipping follow what remains of the run
+        model._update_current_progress_remaining(self.env_steps, self.total_steps)
+        remaining = model._current_progress_remaining
+        c = self.config
+        metrics = self._update(model.lr_schedule(remaining), c.clip_range, c.clip_range_vf)
+        check_finite(named("policy", model.policy.state_dict()))
+        return metrics
 
     @torch.no_grad()
     def _give_rewards(self, batch: Transitions, reward: RewardFn) -> np.ndarray:
@@ -225,13 +248,6 @@ class PPOLearner:
         buffer.compute_returns_and_advantage(last_values, model._last_episode_starts)
         return raw
 
-    def _metrics(self) -> Metrics:
-        logged = self.model.logger.name_to_value
-        names = ("approx_kl", "clip_fraction", "value_loss", "explained_variance", "std")
-        metrics = {f"ppo/{name}": float(logged[f"train/{name}"]) for name in names}
-        logged.clear()
-        return metrics
-
     def policy(self) -> Policy:
         """The current policy, exported: a copy that later updates leave alone."""
         normaliser, box = self._normaliser, self.venv.action_space
@@ -240,7 +256,7 @@ class PPOLearner:
         weights |= {"obs_mean": normaliser.mean.cpu().numpy().copy(), "obs_std": normaliser.std.cpu().numpy()}
         weights |= {"action_low": box.low, "action_high": box.high}
         sizes = (len(normaliser.mean), len(box.low))
-        spec = PolicySpec(self.env_id, *sizes, self.config.hidden, "tanh", "gaussian")
+        spec = PolicySpec(self.env_id, *sizes, self.config.hidden, self.config.activation, "gaussian")
         return Policy(spec, weights)
 
     def state_dict(self) -> dict[str, Any]:
@@ -248,7 +264,7 @@ class PPOLearner:
         model = self.model
         return {
             "policy": model.policy.state_dict(),
-            "optimizer": model.policy.optimizer.state_dict(),
+            "optimizer": self._update.optimizer.state_dict(),
             "steps": model.num_timesteps,
             "updates": model._n_updates,
             "last_obs": model._last_obs,
@@ -263,7 +279,7 @@ class PPOLearner:
         """Go on where another learner of the same settings was."""
         model = self.model
         model.policy.load_state_dict(state["policy"])
-        model.policy.optimizer.load_state_dict(state["optimizer"])
+        self._update.optimizer.load_state_dict(state["optimizer"])
         model.num_timesteps, model._n_updates = state["steps"], state["updates"]
         model._last_obs, model._last_episode_starts = state["last_obs"], state["last_starts"]
         self._scale.load_state_dict(state["scale"])

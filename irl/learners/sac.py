@@ -12,7 +12,9 @@ stepped at once and updated from less or more than once a step; the exported pol
 average of the weights.
 """
 
+import contextlib
 import copy
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
@@ -40,7 +42,13 @@ from irl.policies.policy import Policy, PolicySpec
 
 @dataclass(frozen=True)
 class SACConfig:
-    """How the policy is improved."""
+    """How the policy is improved: the keywords of SB3's SAC.
+
+    `learning_rate` is `lr` with its schedule, `train_freq` and `gradient_steps` are `updates_per_step`,
+    `policy_kwargs` are `hidden` and `n_critics`. There are no `replay_buffer_*`, `optimize_memory_usage` and
+    `n_steps`, because the memory is irl's own and rewards are decided as a batch is drawn, no `use_sde`,
+    because an exported policy has no such noise, and no `action_noise`: SAC draws its actions.
+    """
 
     KIND: ClassVar[str] = "sac"
     n_envs: int = 1
@@ -62,7 +70,15 @@ class SACConfig:
     gamma: float = 0.99
     """Discount per environment step."""
     tau: float = 0.005
-    """How far the target critics follow at each update."""
+    """How far the target critics follow."""
+    target_update_interval: int = 1
+    """Updates between two such steps of the target critics."""
+    ent_coef: str = "auto"
+    """Temperature: `auto` learns it from 1, `auto_0.1` from 0.1, and a number stays."""
+    target_entropy: str = "auto"
+    """Entropy that a learned temperature aims at, nats: a number; `auto` is minus the number of actions."""
+    n_critics: int = 2
+    """Critics; the lowest counts."""
     hidden: tuple[int, ...] = (256, 256)
     """Width of each hidden layer of actor and critics, ReLU between."""
     products: Literal["float32", "bfloat16"] = "float32"
@@ -73,6 +89,9 @@ class SACConfig:
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "buffer_size")
+        check_at_least(self, 1, "target_update_interval", "n_critics")
+        _number_or_auto("ent_coef", self.ent_coef.removeprefix("auto_"), above=0.0)
+        _number_or_auto("target_entropy", self.target_entropy)
         check_at_least(self, 0, "learning_starts", "lr", "tau", "updates_per_step")
         if self.steps_per_round % self.n_envs:
             raise ValueError(
@@ -141,8 +160,12 @@ class SACLearner:
             batch_size=config.batch_size,
             tau=config.tau,
             gamma=config.gamma,
+            ent_coef=_as_sb3(config.ent_coef),
+            target_entropy=_as_sb3(config.target_entropy),
+            target_update_interval=config.target_update_interval,
             policy_kwargs={
                 "net_arch": list(config.hidden),
+                "n_critics": config.n_critics,
                 "features_extractor_class": NormalisedFeatures,
                 "features_extractor_kwargs": {"normaliser": normaliser},
             },
@@ -265,6 +288,18 @@ class SACLearner:
     def close(self) -> None:
         """Close the environment."""
         self.venv.close()
+
+
+def _number_or_auto(name: str, given: str, above: float = -math.inf) -> None:
+    with contextlib.suppress(ValueError):
+        if given == "auto" or above < float(given) < math.inf:
+            return
+    also = ", auto_0.1" if above == 0.0 else ""
+    raise ValueError(f"{name} must be auto{also} or a number, e.g. {name} 0.2, not {given!r}")
+
+
+def _as_sb3(given: str) -> str | float:
+    return given if given.startswith("auto") else float(given)
 
 
 def _actor_weights(actor: Actor) -> dict[str, Tensor]:

@@ -18,6 +18,26 @@ from irl.envs.make import make
 from irl.envs.replayable import Replayable
 
 
+class Envs(DummyVecEnv):
+    """SB3's vector without its deep copy of every `info`, a quarter of the time of a Hopper step."""
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict]]:
+        """One step of each environment; one that ended is reset."""
+        infos = []
+        for i, env in enumerate(self.envs):
+            obs, self.buf_rews[i], terminated, truncated, given = env.step(self.actions[i])
+            info = {**given, "TimeLimit.truncated": truncated and not terminated}
+            self.buf_dones[i] = terminated or truncated
+            if self.buf_dones[i]:
+                info["terminal_observation"] = obs
+                obs, self.reset_infos[i] = env.reset()
+            self._save_obs(i, obs)
+            infos.append(info)
+        obs = self._obs_from_buf()
+        assert isinstance(obs, np.ndarray)
+        return obs, self.buf_rews.copy(), self.buf_dones.copy(), infos
+
+
 class RecordingVecEnv(VecEnvWrapper):
     """Steps N environments and records each step until `take` is called."""
 
@@ -25,7 +45,7 @@ class RecordingVecEnv(VecEnvWrapper):
         def builder() -> Replayable:
             return Replayable(make(env_id, **(env_kwargs or {})))
 
-        super().__init__(DummyVecEnv([builder for _ in seeds]))
+        super().__init__(Envs([builder for _ in seeds]))
         self._first_seeds = list(seeds)
         self._steps: list[tuple[np.ndarray, ...]] = []
         self._returns, self._lengths = np.zeros(len(seeds)), np.zeros(len(seeds), dtype=np.int64)
