@@ -1,10 +1,22 @@
 """All weights of a network in one tensor: an optimiser's step, a copy or a rounding is one operation."""
 
 from collections.abc import Sequence
+from typing import NoReturn
 
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
+
+
+class Tied:
+    """What trains the weights of modules that it does not own.
+
+    A copy of both would come apart in silence, because torch copies each parameter by itself: copy the
+    modules, and tie the copy.
+    """
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(f"a {type(self).__name__} is tied to its modules' weights and cannot be copied")
 
 
 def flattened(parameters: Sequence[Tensor]) -> Float[Tensor, "P"]:

@@ -6,8 +6,8 @@ slope:    u_n = w phi'_n,   u_{i-1} = (u_i W_i) phi'_{i-1},   grad_x y = u_1 W_1
 
 A gradient penalty differentiates the slope by the weights. Autograd does that with a graph of the graph;
 by hand the rows of all parts of a loss share their products, and those between hidden layers may be in
-bfloat16. What touches inputs or outputs, and every gradient of a weight, is float32. All weights lie in
-one tensor (`irl.core.flat`).
+bfloat16, and with them the gradients of the weights there. What touches inputs or outputs is float32. All
+weights lie in one tensor (`irl.core.flat`).
 """
 
 from collections.abc import Sequence
@@ -17,11 +17,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from irl.core.flat import flattened, views
+from irl.core.flat import Tied, flattened, views
 from irl.core.phi import PHI
 
 
-class Perceptron:
+class Perceptron(Tied):
     """A network of one output whose weights stay those of `layers`."""
 
     def __init__(
@@ -40,7 +40,8 @@ class Perceptron:
         full = self.flat.detach()
         self._rounded = full if dtype == torch.float32 else full.to(dtype)
         exact = views(full, shapes)
-        self.weights = [*exact[:2], *views(self._rounded, shapes)[2:-2], *exact[-2:]]
+        # where nothing is hidden, the first layer is the last
+        self.weights = [*exact[:2], *views(self._rounded, shapes)[2:-2], *exact[2:][-2:]]
         """Weight and bias of each layer, as they are multiplied."""
 
     def refresh(self) -> None:
@@ -66,7 +67,7 @@ class _Evaluate(torch.autograd.Function):
         y = torch.addmv(bias, hidden[-1].to(x.dtype), last[0])
         # of layer i: what reaches it from above, and that times its activation's slope
         into, through = [], []
-        reaching = last.to(net.dtype).expand(slopes, -1)
+        reaching = last.to(hidden[-1].dtype).repeat(slopes, 1)
         for i in range(len(hidden) - 1, 0, -1):
             into.append(reaching)
             through.append(net.times_slope(reaching, hidden[i][len(x) - slopes :]))
@@ -96,7 +97,8 @@ class _Evaluate(torch.autograd.Function):
             net.gradients[2 * i - 1].copy_(g.sum(0))
             if i > 1:
                 g = g @ net.weights[2 * i - 2]
-        return None, net.gradient, None, None
+        # a copy: a loss of two evaluations adds what this returned to what it returns next
+        return None, net.gradient.clone(), None, None
 
 
 def _slope_backward(

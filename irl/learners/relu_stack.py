@@ -4,9 +4,9 @@ h_0 = x,   h_i = relu(W_i h_{i-1} + b_i) for i = 1..n-1,   y = W_n h_{n-1} + b_n
 
 All weights of a stack lie in one flat float32 tensor, and the modules they came from keep views of it: an
 optimiser's step, the rounding to bfloat16 and a target's following are one operation each, and so is a
-layer of all its networks. Hidden products and activations are in `dtype`; the last layer and all gradients
-of weights are float32, so a value of thousands keeps its digits. Where a CPU has bfloat16 instructions, a
-256 x 256 x 256 product takes half the time of a float32 one.
+layer of all its networks. Hidden products and activations are in `dtype`, and with them the gradients of
+hidden weights; the last layer is float32, so a value of thousands keeps its digits. Where a CPU has
+bfloat16 instructions, a 256 x 256 x 256 product takes half the time of a float32 one.
 
 Nothing here is known to autograd: at these sizes its bookkeeping costs as much as the products.
 """
@@ -17,10 +17,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from irl.core.flat import flattened, views
+from irl.core.flat import Tied, flattened, views
 
 
-class ReLUStack:
+class ReLUStack(Tied):
     """N networks whose weights stay those of `bodies`, and of their heads joined as one last layer."""
 
     def __init__(
@@ -32,7 +32,7 @@ class ReLUStack:
         """One row of layers for each network, and one row of heads."""
         n, self.dtype = len(bodies), dtype
         layers = [*zip(*bodies, strict=True), tuple(head for of_one in heads for head in of_one)]
-        parameters = [p for layer in layers for p in (*_weights(layer), *_biases(layer))]
+        parameters = [getattr(m, name) for layer in layers for name in ("weight", "bias") for m in layer]
         shapes = [shape for layer in layers for shape in _shapes(layer, n)]
         self.flat = flattened(parameters)
         """Every weight and bias; what an optimiser is given."""
@@ -77,14 +77,6 @@ class ReLUStack:
         for i in range(len(activations) - 2, -1, -1):
             g = torch.ops.aten.threshold_backward(g, activations[i + 1], 0) @ self.weights[2 * i]
         return g.float()
-
-
-def _weights(layer: Sequence[nn.Linear]) -> list[nn.Parameter]:
-    return [module.weight for module in layer]
-
-
-def _biases(layer: Sequence[nn.Linear]) -> list[nn.Parameter]:
-    return [module.bias for module in layer]
 
 
 def _shapes(layer: Sequence[nn.Linear], n: int) -> list[torch.Size]:

@@ -6,6 +6,9 @@ networks and are not differentiated in the actor's step, the actor sees both end
 is fused, and hidden products may be in bfloat16.
 """
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import torch
 from gymnasium.spaces import Box
 from jaxtyping import Bool, Float
@@ -19,6 +22,28 @@ from irl.core.types import Metrics, Transitions
 from irl.learners import sac_gradients as gradients
 from irl.learners.relu_stack import ReLUStack
 from irl.learners.sac_losses import actor_loss, critic_loss, soft_value, squashed, td_target
+
+
+class _Drawn(NamedTuple):
+    """Actions within [-1, 1], and what their gradients are made of."""
+
+    action: Tensor
+    log_pi: Tensor
+    moved: Tensor
+    """How far the noise moved them before the squashing."""
+    log_std: Tensor
+    """The actor's, before its bounds."""
+
+
+class _Last(NamedTuple):
+    """What the losses of the last update are made of."""
+
+    qs: Tensor
+    target: Tensor
+    values: Tensor
+    log_pi: Tensor
+    temperature: Tensor
+    alive: Tensor | None
 
 
 class SACUpdate:
@@ -54,52 +79,80 @@ class SACUpdate:
         assert isinstance(box, Box)
         self._center = torch.as_tensor((box.high + box.low) / 2, device=device)
         self._half = torch.as_tensor((box.high - box.low) / 2, device=device)
-        self._last: dict[str, Tensor | None] = {}
+        self._last: _Last | None = None
 
     @torch.no_grad()
     def __call__(self, batch: Transitions, reward: Float[Tensor, "B"], lr: float) -> None:
         """Temperature, critics, actor, then the target critics follow. Actions in environment units."""
         for optimizer in self.optimizers:
             optimizer.param_groups[0]["lr"] = lr
-        of_actor, of_critics, of_temperature = self.optimizers
         size, alive, next_alive = len(batch), _alive(batch.absorbing), _alive(batch.next_absorbing)
         obs = self.features(batch.obs, batch.absorbing)
         next_obs = self.features(batch.next_obs, batch.next_absorbing)
         temperature = self._log_temperature.exp().squeeze()
-
         outputs, activations = self._actor(torch.cat([obs, next_obs]))
-        action, log_pi, moved = self._sampled(outputs[0, :size])
-        next_action, next_log_pi, _ = self._sampled(outputs[0, size:])
-        shares = gradients.shares(log_pi, alive)
-        wanted = float(self.model.target_entropy)
-        torch.sum(-shares * (log_pi + wanted), 0, keepdim=True, out=self._log_temperature.grad)
-        of_temperature.step()
+        drawn, following = self._sampled(outputs[0, :size]), self._sampled(outputs[0, size:])
+        shares = gradients.shares(drawn.log_pi, alive)
 
-        if next_alive is not None:
-            # the action of s_abs is 0: decided by where the step leads, not by where it starts
-            none = self.scaled(torch.zeros_like(next_action))
-            next_action = torch.where(next_alive.unsqueeze(1) > 0, next_action, none)
-        next_q = self._targets(torch.cat([next_obs, next_action], 1))[0].squeeze(2).amin(0)
-        value = soft_value(next_q, next_log_pi, temperature, next_alive)
-        target = td_target(reward, value, batch.terminated, self.model.gamma)
-        qs, seen = self._critics(torch.cat([obs, self.scaled(batch.action)], 1))
-        self._critics.differentiate(gradients.of_critics(qs.squeeze(2), target).unsqueeze(2), seen)
-        of_critics.step()
-        self._critics.refresh()
-
-        values, seen = self._critics(torch.cat([obs, action], 1))
-        of_values = gradients.of_values(values.squeeze(2), shares).unsqueeze(2)
-        of_action = self._critics.into_inputs(of_values, seen)[:, :, obs.shape[1] :].sum(0)
-        of_mean, of_log_std = gradients.of_squashed(action, moved, of_action, temperature * shares)
-        of_log_std = of_log_std * _within_bounds(outputs[0, :size].chunk(2, 1)[1])
-        of_outputs = torch.cat([of_mean, of_log_std], 1).unsqueeze(0)
-        self._actor.differentiate(of_outputs, [h[:, :size] for h in activations])
-        of_actor.step()
-        self._actor.refresh()
+        self._improve_temperature(drawn.log_pi, shares)
+        next_value = self._next_value(next_obs, following, temperature, next_alive)
+        target = td_target(reward, next_value, batch.terminated, self.model.gamma)
+        qs = self._improve_critics(torch.cat([obs, self.scaled(batch.action)], 1), target)
+        seen = [h[:, :size] for h in activations]
+        values = self._improve_actor(obs, drawn, seen, shares, temperature)
         self._targets.flat.lerp_(self._critics.flat, self.model.tau)
         self._targets.refresh()
-        self._last = {"qs": qs.squeeze(2), "target": target, "values": values.squeeze(2).amin(0)}
-        self._last |= {"log_pi": log_pi, "temperature": temperature, "alive": alive}
+        self._last = _Last(qs, target, values, drawn.log_pi, temperature, alive)
+
+    def _improve_temperature(self, log_pi: Float[Tensor, "B"], shares: Float[Tensor, "B"]) -> None:
+        excess = log_pi + float(self.model.target_entropy)
+        torch.sum(-shares * excess, 0, keepdim=True, out=self._log_temperature.grad)
+        self.optimizers[2].step()
+
+    def _next_value(
+        self,
+        next_obs: Float[Tensor, "B F"],
+        drawn: _Drawn,
+        temperature: Float[Tensor, ""],
+        alive: Float[Tensor, "B"] | None,
+    ) -> Float[Tensor, "B"]:
+        action = drawn.action
+        if alive is not None:
+            # the action of s_abs is 0: decided by where the step leads, not by where it starts
+            action = torch.where(alive.unsqueeze(1) > 0, action, self.scaled(torch.zeros_like(action)))
+        q = self._targets(torch.cat([next_obs, action], 1))[0].squeeze(2).amin(0)
+        return soft_value(q, drawn.log_pi, temperature, alive)
+
+    def _improve_critics(
+        self, inputs: Float[Tensor, "B I"], target: Float[Tensor, "B"]
+    ) -> Float[Tensor, "N B"]:
+        """What they said before."""
+        outputs, seen = self._critics(inputs)
+        qs = outputs.squeeze(2)
+        self._critics.differentiate(gradients.of_critics(qs, target).unsqueeze(2), seen)
+        self.optimizers[1].step()
+        self._critics.refresh()
+        return qs
+
+    def _improve_actor(
+        self,
+        obs: Float[Tensor, "B F"],
+        drawn: _Drawn,
+        seen: Sequence[Tensor],
+        shares: Float[Tensor, "B"],
+        temperature: Float[Tensor, ""],
+    ) -> Float[Tensor, "B"]:
+        """What the critics said of its actions, before; `seen` is what the actor's layers made of `obs`."""
+        outputs, through = self._critics(torch.cat([obs, drawn.action], 1))
+        qs = outputs.squeeze(2)
+        of_inputs = self._critics.into_inputs(gradients.of_values(qs, shares).unsqueeze(2), through)
+        of_action, of_log_pi = of_inputs[:, :, obs.shape[1] :].sum(0), temperature * shares
+        of_mean, of_log_std = gradients.of_squashed(drawn.action, drawn.moved, of_action, of_log_pi)
+        of_log_std = of_log_std * _within_bounds(drawn.log_std)
+        self._actor.differentiate(torch.cat([of_mean, of_log_std], 1).unsqueeze(0), seen)
+        self.optimizers[0].step()
+        self._actor.refresh()
+        return qs.amin(0)
 
     def refresh(self) -> None:
         """Call it after the weights were loaded."""
@@ -120,29 +173,25 @@ class SACUpdate:
 
     def metrics(self) -> Metrics:
         """What the last update was like."""
-        if not self._last:
+        if (last := self._last) is None:
             return {}
-        last = self._last
-        of_actor = actor_loss(last["values"], last["log_pi"], last["temperature"], last["alive"])  # pyright: ignore[reportArgumentType]
-        of_critics = critic_loss(last["qs"], last["target"])  # pyright: ignore[reportArgumentType]
+        of_actor = actor_loss(last.values, last.log_pi, last.temperature, last.alive)
+        of_critics = critic_loss(last.qs, last.target)
         return {
             "sac/actor_loss": float(of_actor),
             "sac/critic_loss": float(of_critics),
-            "sac/ent_coef": float(last["temperature"]),  # pyright: ignore[reportArgumentType]
+            "sac/ent_coef": float(last.temperature),
         }
 
     def sample(self, features: Float[Tensor, "B F"]) -> Float[Tensor, "B A"]:
         """Actions within [-1, 1] for normalised observations."""
-        return self._sampled(self._actor(features)[0][0])[0]
+        return self._sampled(self._actor(features)[0][0]).action
 
-    def _sampled(
-        self, outputs: Float[Tensor, "B C"]
-    ) -> tuple[Float[Tensor, "B A"], Float[Tensor, "B"], Float[Tensor, "B A"]]:
-        """Actions, their log pi, and how far the noise moved them before the squashing."""
+    def _sampled(self, outputs: Float[Tensor, "B C"]) -> _Drawn:
         mean, log_std = outputs.chunk(2, dim=1)
         noise = torch.randn(mean.shape, generator=self.rng, device=mean.device)
-        log_std = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
-        return *squashed(mean, log_std, noise), log_std.exp() * noise
+        bounded = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
+        return _Drawn(*squashed(mean, bounded, noise), bounded.exp() * noise, log_std)
 
     def scaled(self, action: Float[Tensor, "B A"]) -> Float[Tensor, "B A"]:
         """Environment units to [-1, 1]."""
