@@ -1,3 +1,5 @@
+"""Where the slope is asked for, and what it costs there; `Slopes` says how it is found."""
+
 import numpy as np
 import pytest
 import torch
@@ -6,9 +8,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from torch import Tensor
 
-from irl.core.nets import mlp
+from irl.core.nets import Normaliser
 from irl.core.rng import torch_stream
-from irl.discriminators.regularisers import gradient_penalty
+from irl.discriminators.regularisers import between, slope_penalty
+from irl.discriminators.slopes import Slopes
+from irl.rewards.nets import LogitNet, LogitSpec
 
 rows = arrays(np.float64, (5, 3), elements=st.floats(-100, 100)).map(torch.from_numpy)
 
@@ -18,30 +22,41 @@ def points(n: int, inputs: int, shift: float) -> Tensor:
 
 
 def judged(expert: Tensor, policy: Tensor, seed: int = 0) -> Tensor:
-    """Where the logit's gradient was taken."""
-    seen = []
-
-    def logit(x: Tensor) -> Tensor:
-        seen.append(x.detach())
-        return x.sum(1)
-
-    gradient_penalty(logit, expert, policy, torch_stream(seed, "penalty"))
-    (x,) = seen
-    return x
+    return between(expert, policy, torch_stream(seed, "penalty"))
 
 
-@given(rows, rows, st.lists(st.floats(-5, 5), min_size=3, max_size=3))
-def test_a_linear_logit_is_fined_for_its_slope_alone(expert: Tensor, policy: Tensor, slope) -> None:
-    weight = torch.tensor(slope, dtype=torch.float64)
-    penalty = gradient_penalty(lambda x: x @ weight + 3, expert, policy, torch_stream(0, "penalty"))
-    assert float(penalty) == pytest.approx((np.linalg.norm(slope) - 1) ** 2, rel=1e-12, abs=1e-14)
+def network(hidden: tuple[int, ...], inputs: int = 3) -> LogitNet:
+    return LogitNet(LogitSpec(inputs - 1, 1, hidden), Normaliser(inputs - 1), torch_stream(0, "net"))
+
+
+def fine(net: LogitNet, x: Tensor, center: float = 1.0) -> Tensor:
+    """The penalty of a network at `x`, as training takes it."""
+    return slope_penalty(Slopes(net, x.dtype)(x[:0], x)[1], center)
+
+
+@given(rows, st.floats(0, 5))
+def test_it_is_the_mean_of_each_rows_own_fine(slopes: Tensor, center: float) -> None:
+    expected = np.mean([(np.linalg.norm(row) - center) ** 2 for row in slopes.numpy()])
+    assert float(slope_penalty(slopes, center)) == pytest.approx(expected, rel=1e-12, abs=1e-14)
+
+
+@given(rows, st.lists(st.floats(-5, 5), min_size=3, max_size=3))
+def test_a_linear_logit_is_fined_for_its_slope_alone(x: Tensor, slope) -> None:
+    net = network(()).double()
+    with torch.no_grad():
+        net.body[0].get_parameter("weight").copy_(torch.tensor([slope], dtype=torch.float64))
+    assert float(fine(net, x).detach()) == pytest.approx(
+        (np.linalg.norm(slope) - 1) ** 2, rel=1e-12, abs=1e-14
+    )
 
 
 def test_it_looks_at_the_logit_not_at_its_sigmoid() -> None:
-    x = torch.full((4, 2), 100.0, dtype=torch.float64)
-    unit = torch.tensor([0.6, 0.8], dtype=torch.float64)
+    net = network((), 2).double()
+    with torch.no_grad():
+        net.body[0].get_parameter("weight").copy_(torch.tensor([[0.6, 0.8]]))
     # there sigmoid' is 0, and a penalty on D would be 1
-    assert float(gradient_penalty(lambda z: z @ unit, x, x, torch_stream(0, "p"))) == pytest.approx(0.0)
+    far = torch.full((4, 2), 100.0, dtype=torch.float64)
+    assert float(fine(net, far).detach()) == pytest.approx(0.0)
 
 
 def test_it_looks_between_the_two_one_share_a_row() -> None:
@@ -59,11 +74,10 @@ def test_it_looks_between_the_two_one_share_a_row() -> None:
 
 
 def test_a_curved_logit_is_fined_for_the_slope_at_those_points() -> None:
-    expert, policy = points(50, 3, 3.0), points(50, 3, -2.0)
+    x = judged(points(50, 3, 3.0), points(50, 3, -2.0))
     # grad of |x|^2 / 2 is x itself
-    penalty = gradient_penalty(lambda x: x.square().sum(1) / 2, expert, policy, torch_stream(0, "penalty"))
-    expected = (judged(expert, policy).norm(dim=1) - 1).square().mean()
-    assert float(penalty.detach()) == pytest.approx(float(expected), rel=1e-6)
+    expected = np.mean([(np.linalg.norm(row) - 1) ** 2 for row in x.double().numpy()])
+    assert float(slope_penalty(x)) == pytest.approx(expected, rel=1e-6)
 
 
 def test_equal_points_are_judged_where_they_are() -> None:
@@ -72,47 +86,56 @@ def test_equal_points_are_judged_where_they_are() -> None:
 
 
 def test_the_parameters_get_its_gradient() -> None:
-    weight = torch.tensor([3.0, 4.0], requires_grad=True)
-    x = points(10, 2, 1.0)
-    gradient_penalty(lambda z: z @ weight, x, -x, torch_stream(0, "penalty")).backward()
-    assert weight.grad is not None
-    # d/dw (|w| - 1)^2 = 2 (|w| - 1) w / |w|
-    assert weight.grad.tolist() == pytest.approx([2 * 4 * 0.6, 2 * 4 * 0.8], rel=1e-6)
+    net = network((), 2)
+    with torch.no_grad():
+        net.body[0].get_parameter("weight").copy_(torch.tensor([[3.0, 4.0]]))
+    slopes = Slopes(net)
+    slope_penalty(slopes(points(0, 2, 0.0), points(10, 2, 1.0))[1]).backward()
+    (flat,) = slopes.trained
+    assert flat.grad is not None
+    # d/dw (|w| - 1)^2 = 2 (|w| - 1) w / |w|, and the bias has no part in it
+    assert flat.grad.tolist() == pytest.approx([2 * 4 * 0.6, 2 * 4 * 0.8, 0.0], rel=1e-6)
 
 
-def test_every_weight_of_a_network_is_reached_as_finite_differences_say() -> None:
-    net = mlp((2, 4, 1), "tanh", torch_stream(0, "net")).double()
-    expert, policy = points(6, 2, 1.0).double(), points(6, 2, -1.0).double()
+@pytest.mark.parametrize("hidden", [(4,), (4, 3)])
+def test_every_weight_of_a_network_is_reached_as_finite_differences_say(hidden: tuple[int, ...]) -> None:
+    net = network(hidden, 2).double()
+    slopes, x = Slopes(net, torch.float64), judged(points(6, 2, 1.0).double(), points(6, 2, -1.0).double())
 
     def penalty() -> Tensor:
-        return gradient_penalty(lambda x: net(x).squeeze(1), expert, policy, torch_stream(0, "p"))
+        return slope_penalty(slopes(x[:0], x)[1])
 
-    weight = next(net.parameters())
-    (gradient,) = torch.autograd.grad(penalty(), weight)
-    step, numeric = 1e-6, torch.zeros_like(weight)
-    for index in np.ndindex(*weight.shape):
+    (flat,) = slopes.trained
+    (gradient,) = torch.autograd.grad(penalty(), flat)
+    step, numeric = 1e-6, torch.zeros_like(flat)
+    for i in range(len(flat)):
         values = []
         for sign in (1, -1):
             with torch.no_grad():
-                weight[index] += sign * step
+                flat[i] += sign * step
             values.append(float(penalty().detach()))
             with torch.no_grad():
-                weight[index] -= sign * step
-        numeric[index] = (values[0] - values[1]) / (2 * step)
-    torch.testing.assert_close(gradient, numeric.detach(), rtol=1e-5, atol=1e-8)
+                flat[i] -= sign * step
+        numeric[i] = (values[0] - values[1]) / (2 * step)
+    torch.testing.assert_close(gradient, numeric, rtol=1e-5, atol=1e-8)
 
 
-def test_a_flat_logit_is_fined_one_and_its_gradient_is_finite() -> None:
-    weight = torch.zeros(2, requires_grad=True)
-    x = points(4, 2, 1.0)
-    penalty = gradient_penalty(lambda z: z @ weight, x, -x, torch_stream(0, "penalty"))
+@pytest.mark.parametrize(("center", "cost"), [(1.0, 1.0), (0.0, 0.0)])
+def test_a_flat_logit_costs_the_centres_square_and_its_gradient_is_finite(center: float, cost: float) -> None:
+    net = network((4, 4), 2)
+    with torch.no_grad():
+        for parameter in net.body.parameters():
+            parameter.zero_()
+    slopes, x = Slopes(net), points(4, 2, 1.0)
+    penalty = slope_penalty(slopes(x[:0], x)[1], center)
     penalty.backward()
-    assert float(penalty.detach()) == 1.0
-    assert weight.grad is not None
-    assert torch.isfinite(weight.grad).all()
+    assert float(penalty.detach()) == cost
+    (flat,) = slopes.trained
+    assert flat.grad is not None
+    assert torch.isfinite(flat.grad).all()
 
 
-def test_it_is_the_generators() -> None:
+def test_where_it_looks_is_the_generators() -> None:
     expert, policy = points(5, 2, 3.0), points(5, 2, -2.0)
     first = judged(expert, policy)
     torch.rand(10)
@@ -120,38 +143,29 @@ def test_it_is_the_generators() -> None:
     assert not torch.equal(judged(expert, policy, seed=1), first)
 
 
-def test_the_batches_get_no_gradient_and_the_global_stream_no_draw() -> None:
+def test_the_global_stream_gets_no_draw_and_the_batches_stay_as_they_are() -> None:
     expert, policy = points(5, 2, 3.0), points(5, 2, -2.0)
-    before = torch.get_rng_state()
-    gradient_penalty(lambda x: x.square().sum(1), expert, policy, torch_stream(0, "penalty"))
+    before, kept = torch.get_rng_state(), (expert.clone(), policy.clone())
+    x = judged(expert, policy)
+    fine(network((4,), 2), x).backward()
     assert torch.equal(torch.get_rng_state(), before)
-    assert not expert.requires_grad
+    assert torch.equal(expert, kept[0])
+    assert torch.equal(policy, kept[1])
+    assert not any(t.requires_grad for t in (expert, policy, x))
 
 
 @pytest.mark.parametrize("center", [0.0, 1.0, 2.5])
 def test_it_is_what_one_row_at_a_time_gives(center: float) -> None:
     """The slow oracle: one share a row from the same stream, one gradient a row, of the logit."""
-    net = mlp((3, 8, 1), "tanh", torch_stream(0, "net"))
+    net = network((8,))
+    with torch.no_grad():
+        net.body[-1].get_parameter("weight").mul_(30.0)  # sure of itself: a sigmoid would be flat there
     expert, policy = points(20, 3, 1.0), points(20, 3, -1.0)
-
-    def logit(x: Tensor) -> Tensor:
-        return 30 * net(x).squeeze(1)  # sure of itself: a sigmoid would be flat there
-
-    found = gradient_penalty(logit, expert, policy, torch_stream(0, "penalty"), center)
+    found = fine(net, judged(expert, policy), center)
     shares = torch.rand(20, 1, generator=torch_stream(0, "penalty"))
     fines = []
     for share, of_expert, of_policy in zip(shares, expert, policy, strict=True):
         x = (share * of_expert + (1 - share) * of_policy).requires_grad_(True)
-        (gradient,) = torch.autograd.grad(logit(x[None]).sum(), x)
+        (gradient,) = torch.autograd.grad(net.of_inputs(x[None]).sum(), x)
         fines.append((float(gradient.norm()) - center) ** 2)
     assert float(found.detach()) == pytest.approx(np.mean(fines), rel=1e-5)
-
-
-def test_centred_at_zero_a_flat_logit_is_free_and_its_gradient_finite() -> None:
-    weight = torch.zeros(2, requires_grad=True)
-    x = points(4, 2, 1.0)
-    penalty = gradient_penalty(lambda z: z @ weight, x, -x, torch_stream(0, "penalty"), 0.0)
-    penalty.backward()
-    assert float(penalty.detach()) == 0.0
-    assert weight.grad is not None
-    assert torch.isfinite(weight.grad).all()
