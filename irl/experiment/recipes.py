@@ -20,7 +20,17 @@ _PPO = PPOConfig(n_envs=8, batch_size=256, n_epochs=10, lr=3e-4, gae_lambda=0.95
 
 _SAC = SACConfig(lr_schedule="linear", average=0.98)
 
-_CHEETAH = SACConfig(learning_starts=10_000, lr_schedule="linear", products="bfloat16", average=0.98)
+# Truncated quantile critics: SAC itself stands still between 6,000 and 7,000 from 200k steps on.
+_CHEETAH = SACConfig(
+    n_envs=2,
+    updates_per_step=0.5,
+    learning_starts=10_000,
+    quantiles=25,
+    lr=6e-4,
+    lr_schedule="linear",
+    products="bfloat16",
+    average=0.98,
+)
 
 # Left alone the actions' deviation falls to .06 by 6M steps, and a gait that was never disturbed falls over
 # in a third of the episodes; the entropy bonus keeps it disturbed.

@@ -7,6 +7,9 @@ The networks are those of Stable-Baselines3's `SAC`; stepping and updating are i
 Each batch asks the `RewardFn` when it is drawn, so no stored reward can go stale; a time limit is no
 termination.
 
+With `quantiles` critics learn the distribution of returns and its highest atoms are left out: truncated
+quantile critics (Kuznetsov et al. 2020, arXiv:2005.04269; `irl.learners.heads`).
+
 Differs from the paper: observations may be normalised, and are clipped then; several environments may be
 stepped at once and updated from less or more than once a step; the exported policy may be a moving
 average of the weights.
@@ -28,11 +31,12 @@ from torch import Tensor, nn
 
 from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
-from irl.core.nets import CLIP, NO_CLIP, Normaliser
+from irl.core.nets import CLIP, NO_CLIP, Normaliser, linear
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures, Spaces, widened
+from irl.learners.heads import Lowest, Quantiles
 from irl.learners.replay import Replay
 from irl.learners.sac_update import SACUpdate
 from irl.learners.schedule import learning_rate
@@ -79,6 +83,10 @@ class SACConfig:
     """Entropy that a learned temperature aims at, nats: a number; `auto` is minus the number of actions."""
     n_critics: int = 2
     """Critics; the lowest counts."""
+    quantiles: int = 0
+    """Atoms of each critic's distribution of returns (TQC, e.g. 25); 0: a critic says one number (SAC)."""
+    dropped_quantiles: int = 2
+    """Highest atoms of each critic that count in no target; only with `quantiles`."""
     hidden: tuple[int, ...] = (256, 256)
     """Width of each hidden layer of actor and critics, ReLU between."""
     products: Literal["float32", "bfloat16"] = "float32"
@@ -93,6 +101,11 @@ class SACConfig:
         _number_or_auto("ent_coef", self.ent_coef.removeprefix("auto_"), above=0.0)
         _number_or_auto("target_entropy", self.target_entropy)
         check_at_least(self, 0, "learning_starts", "lr", "tau", "updates_per_step")
+        check_at_least(self, 0, "quantiles", "dropped_quantiles")
+        if self.quantiles and self.dropped_quantiles >= self.quantiles:
+            raise ValueError(
+                f"dropped_quantiles must be below quantiles ({self.quantiles}), not {self.dropped_quantiles}"
+            )
         if self.steps_per_round % self.n_envs:
             raise ValueError(
                 f"steps_per_round must be a multiple of n_envs ({self.n_envs}), not {self.steps_per_round}"
@@ -138,7 +151,9 @@ class SACLearner:
         self.model = self._sb3(seed, device)
         self._rng = torch_stream(seed, "sac", device)
         dtype = torch.bfloat16 if config.products == "bfloat16" else torch.float32
-        self._update = SACUpdate(self.model, self._normaliser, self._rng, dtype, absorbing_scale)
+        head = Quantiles(config.quantiles, config.dropped_quantiles) if config.quantiles else Lowest()
+        self._widen_critics(head.outputs, torch_stream(seed, "critics"))
+        self._update = SACUpdate(self.model, self._normaliser, self._rng, dtype, absorbing_scale, head)
         capacity = min(config.buffer_size, total_steps + config.steps_per_round)
         self.replay = Replay(capacity, config.n_envs, obs_size, len(self._low), device)
         self._average = WeightAverage(_actor_weights(self.model.actor), config.average)
@@ -172,6 +187,16 @@ class SACLearner:
             seed=seed,
             device=device,
         )
+
+    def _widen_critics(self, outputs: int, rng: torch.Generator) -> None:
+        """Give SB3's critics more than one output; the targets begin as their copies."""
+        critic, target = self.model.critic, self.model.critic_target
+        for net, following in zip(critic.q_networks, target.q_networks, strict=True):
+            assert isinstance(net, nn.Sequential)
+            assert isinstance(following, nn.Sequential)
+            if outputs > 1:
+                net[-1] = linear(self.config.hidden[-1], outputs, rng).to(self.model.device)
+                following[-1] = copy.deepcopy(net[-1])
 
     @property
     def env_steps(self) -> int:
@@ -261,7 +286,7 @@ class SACLearner:
             "policy": self.model.policy.state_dict(),
             "optimizers": [optimizer.state_dict() for optimizer in self._update.optimizers],
             "log_ent_coef": self.model.log_ent_coef,
-            "steps": (self._env_steps, self._owed),
+            "steps": (self._env_steps, self._owed, self._update.updates),
             "last_obs": self.venv.obs,
             "replay": self.replay.state_dict(),
             "average": self._average.state_dict(),
@@ -276,9 +301,9 @@ class SACLearner:
         for optimizer, its in zip(self._update.optimizers, state["optimizers"], strict=True):
             optimizer.load_state_dict(its)
         with torch.no_grad():
-            assert isinstance(self.model.log_ent_coef, Tensor)
-            self.model.log_ent_coef.copy_(state["log_ent_coef"])
-        self._env_steps, self._owed = state["steps"]
+            if isinstance(self.model.log_ent_coef, Tensor):
+                self.model.log_ent_coef.copy_(state["log_ent_coef"])
+        self._env_steps, self._owed, self._update.updates = state["steps"]
         self.replay.load_state_dict(state["replay"])
         self._average.load_state_dict(state["average"])
         self.venv.load_state_dict(state["environments"])

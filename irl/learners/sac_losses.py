@@ -26,20 +26,20 @@ def squashed(
 
 def td_target(
     reward: Float[Tensor, "B"],
-    next_value: Float[Tensor, "B"],
+    next_value: Float[Tensor, "*M B"],
     ended: Bool[Tensor, "B"],
     gamma: float,
-) -> Float[Tensor, "B"]:
+) -> Float[Tensor, "*M B"]:
     """Y = r + gamma V(s'), where V is 0 after a termination; a time limit is none."""
     return reward + gamma * next_value * (~ended)
 
 
 def soft_value(
-    q: Float[Tensor, "B"],
+    q: Float[Tensor, "*M B"],
     log_pi: Float[Tensor, "B"],
     temperature: Float[Tensor, ""],
     alive: Float[Tensor, "B"] | None,
-) -> Float[Tensor, "B"]:
+) -> Float[Tensor, "*M B"]:
     """V(s) = Q(s, a) - alpha log pi(a|s); without the entropy where nobody acts."""
     return q - temperature * (log_pi if alive is None else alive * log_pi)
 

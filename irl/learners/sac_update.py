@@ -20,8 +20,9 @@ from irl.core.flat import linear_layers
 from irl.core.nets import Normaliser
 from irl.core.types import Metrics, Transitions
 from irl.learners import sac_gradients as gradients
-from irl.learners.relu_stack import ReLUStack
-from irl.learners.sac_losses import actor_loss, critic_loss, soft_value, squashed, td_target
+from irl.learners.heads import Head, Lowest
+from irl.learners.sac_losses import actor_loss, soft_value, squashed, td_target
+from irl.learners.stack import Stack
 
 
 class _Drawn(NamedTuple):
@@ -38,7 +39,7 @@ class _Drawn(NamedTuple):
 class _Last(NamedTuple):
     """What the losses of the last update are made of."""
 
-    qs: Tensor
+    said: Tensor
     target: Tensor
     values: Tensor
     log_pi: Tensor
@@ -56,22 +57,30 @@ class SACUpdate:
         rng: torch.Generator | None,
         dtype: torch.dtype,
         absorbing_scale: float = 0.0,
+        head: Head | None = None,
     ) -> None:
         """`rng` draws the actions' noise; None is torch's global generator, which SB3 draws from.
+
+        `head` says what the critics' outputs are; one number each unless given.
 
         With `absorbing_scale` the networks take one number more than an observation has: that, in the
         absorbing state, else 0.
         """
-        self.model, self.rng, self._scale = model, rng, absorbing_scale
+        self.model, self.rng, self._scale, self._head = model, rng, absorbing_scale, head or Lowest()
+        self.updates = 0
+        """How many there were."""
         self._mean, self._std, self._clip = normaliser.mean, normaliser.std, normaliser.clip
         actor, device = model.actor, model.device
         assert isinstance(actor.mu, nn.Linear)
         assert isinstance(actor.log_std, nn.Linear)
-        assert isinstance(model.log_ent_coef, Tensor)
-        self._actor = ReLUStack([linear_layers(actor.latent_pi)], [[actor.mu, actor.log_std]], dtype)
+        self._actor = Stack([linear_layers(actor.latent_pi)], [[actor.mu, actor.log_std]], dtype=dtype)
         self._critics = _value_nets(model.critic.q_networks, dtype)
         self._targets = _value_nets(model.critic_target.q_networks, dtype)
-        self._log_temperature = model.log_ent_coef.detach()
+        # SB3 has a logarithm of a temperature that is learned, and the number of one that stays
+        self._learns_temperature = model.log_ent_coef is not None
+        learned = model.log_ent_coef if self._learns_temperature else model.ent_coef_tensor.log().reshape(1)
+        assert isinstance(learned, Tensor)
+        self._log_temperature = learned.detach()
         self._log_temperature.grad = torch.zeros_like(self._log_temperature)
         trained = (self._actor.flat, self._critics.flat, self._log_temperature)
         self.optimizers = [torch.optim.Adam([weights], fused=True) for weights in trained]
@@ -94,15 +103,18 @@ class SACUpdate:
         drawn, following = self._sampled(outputs[0, :size]), self._sampled(outputs[0, size:])
         shares = gradients.shares(drawn.log_pi, alive)
 
-        self._improve_temperature(drawn.log_pi, shares)
+        if self._learns_temperature:
+            self._improve_temperature(drawn.log_pi, shares)
         next_value = self._next_value(next_obs, following, temperature, next_alive)
         target = td_target(reward, next_value, batch.terminated, self.model.gamma)
-        qs = self._improve_critics(torch.cat([obs, self.scaled(batch.action)], 1), target)
+        said = self._improve_critics(torch.cat([obs, self.scaled(batch.action)], 1), target)
         seen = [h[:, :size] for h in activations]
         values = self._improve_actor(obs, drawn, seen, shares, temperature)
-        self._targets.flat.lerp_(self._critics.flat, self.model.tau)
-        self._targets.refresh()
-        self._last = _Last(qs, target, values, drawn.log_pi, temperature, alive)
+        self._last = _Last(said, target, values, drawn.log_pi, temperature, alive)
+        self.updates += 1
+        if self.updates % self.model.target_update_interval == 0:
+            self._targets.flat.lerp_(self._critics.flat, self.model.tau)
+            self._targets.refresh()
 
     def _improve_temperature(self, log_pi: Float[Tensor, "B"], shares: Float[Tensor, "B"]) -> None:
         excess = log_pi + float(self.model.target_entropy)
@@ -115,24 +127,23 @@ class SACUpdate:
         drawn: _Drawn,
         temperature: Float[Tensor, ""],
         alive: Float[Tensor, "B"] | None,
-    ) -> Float[Tensor, "B"]:
+    ) -> Float[Tensor, "M B"]:
         action = drawn.action
         if alive is not None:
             # the action of s_abs is 0: decided by where the step leads, not by where it starts
             action = torch.where(alive.unsqueeze(1) > 0, action, self.scaled(torch.zeros_like(action)))
-        q = self._targets(torch.cat([next_obs, action], 1))[0].squeeze(2).amin(0)
-        return soft_value(q, drawn.log_pi, temperature, alive)
+        ahead = self._head.ahead(self._targets(torch.cat([next_obs, action], 1))[0])
+        return soft_value(ahead, drawn.log_pi, temperature, alive)
 
     def _improve_critics(
-        self, inputs: Float[Tensor, "B I"], target: Float[Tensor, "B"]
-    ) -> Float[Tensor, "N B"]:
+        self, inputs: Float[Tensor, "B I"], target: Float[Tensor, "M B"]
+    ) -> Float[Tensor, "N B K"]:
         """What they said before."""
-        outputs, seen = self._critics(inputs)
-        qs = outputs.squeeze(2)
-        self._critics.differentiate(gradients.of_critics(qs, target).unsqueeze(2), seen)
+        said, seen = self._critics(inputs)
+        self._critics.differentiate(self._head.of_loss(said, target), seen)
         self.optimizers[1].step()
         self._critics.refresh()
-        return qs
+        return said
 
     def _improve_actor(
         self,
@@ -143,16 +154,15 @@ class SACUpdate:
         temperature: Float[Tensor, ""],
     ) -> Float[Tensor, "B"]:
         """What the critics said of its actions, before; `seen` is what the actor's layers made of `obs`."""
-        outputs, through = self._critics(torch.cat([obs, drawn.action], 1))
-        qs = outputs.squeeze(2)
-        of_inputs = self._critics.into_inputs(gradients.of_values(qs, shares).unsqueeze(2), through)
+        said, through = self._critics(torch.cat([obs, drawn.action], 1))
+        of_inputs = self._critics.into_inputs(self._head.of_value(said, shares), through)
         of_action, of_log_pi = of_inputs[:, :, obs.shape[1] :].sum(0), temperature * shares
         of_mean, of_log_std = gradients.of_squashed(drawn.action, drawn.moved, of_action, of_log_pi)
         of_log_std = of_log_std * _within_bounds(drawn.log_std)
         self._actor.differentiate(torch.cat([of_mean, of_log_std], 1).unsqueeze(0), seen)
         self.optimizers[0].step()
         self._actor.refresh()
-        return qs.amin(0)
+        return self._head.value(said)
 
     def refresh(self) -> None:
         """Call it after the weights were loaded."""
@@ -176,7 +186,7 @@ class SACUpdate:
         if (last := self._last) is None:
             return {}
         of_actor = actor_loss(last.values, last.log_pi, last.temperature, last.alive)
-        of_critics = critic_loss(last.qs, last.target)
+        of_critics = self._head.loss(last.said, last.target)
         return {
             "sac/actor_loss": float(of_actor),
             "sac/critic_loss": float(of_critics),
@@ -206,9 +216,9 @@ def _alive(absorbing: Bool[Tensor, "B"] | None) -> Float[Tensor, "B"] | None:
     return None if absorbing is None else (~absorbing).float()
 
 
-def _value_nets(nets: nn.ModuleList | list[nn.Module], dtype: torch.dtype) -> ReLUStack:
+def _value_nets(nets: nn.ModuleList | list[nn.Module], dtype: torch.dtype) -> Stack:
     layers = [linear_layers(net) for net in nets]
-    return ReLUStack([of_one[:-1] for of_one in layers], [of_one[-1:] for of_one in layers], dtype)
+    return Stack([of_one[:-1] for of_one in layers], [of_one[-1:] for of_one in layers], dtype=dtype)
 
 
 def _within_bounds(log_std: Float[Tensor, "B A"]) -> Bool[Tensor, "B A"]:

@@ -4,9 +4,9 @@ h_0 = x,   h_i = phi(W_i h_{i-1} + b_i) for i = 1..n-1,   y = W_n h_{n-1} + b_n,
 
 All weights of a stack lie in one flat float32 tensor, and the modules they came from keep views of it: an
 optimiser's step, the rounding to bfloat16 and a target's following are one operation each, and so is a
-layer of all its networks. Hidden products and activations are in `dtype`; the last layer and all gradients
-of weights are float32, so a value of thousands keeps its digits. Where a CPU has bfloat16 instructions, a
-256 x 256 x 256 product takes half the time of a float32 one.
+layer of all its networks. Hidden products and activations are in `dtype`, and with them the gradients of
+hidden weights; the last layer is float32, so a value of thousands keeps its digits. Where a CPU has
+bfloat16 instructions, a 256 x 256 x 256 product takes half the time of a float32 one.
 
 Nothing here is known to autograd: at these sizes its bookkeeping costs as much as the products.
 """
@@ -17,11 +17,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from irl.core.flat import flattened, views
+from irl.core.flat import Tied, flattened, views
 from irl.core.phi import PHI
 
 
-class Stack:
+class Stack(Tied):
     """N networks whose weights stay those of `bodies`, and of their heads joined as one last layer."""
 
     def __init__(
@@ -34,7 +34,7 @@ class Stack:
         """One row of layers for each network, and one row of heads."""
         n, self.dtype, (self.phi, self.times_slope) = len(bodies), dtype, PHI[activation]
         layers = [*zip(*bodies, strict=True), tuple(head for of_one in heads for head in of_one)]
-        parameters = [p for layer in layers for p in (*_weights(layer), *_biases(layer))]
+        parameters = [getattr(m, name) for layer in layers for name in ("weight", "bias") for m in layer]
         shapes = [shape for layer in layers for shape in _shapes(layer, n)]
         self.flat = flattened(parameters)
         """Every weight and bias; what an optimiser is given."""
@@ -79,14 +79,6 @@ class Stack:
         for i in range(len(activations) - 2, -1, -1):
             g = self.times_slope(g, activations[i + 1]) @ self.weights[2 * i]
         return g.float()
-
-
-def _weights(layer: Sequence[nn.Linear]) -> list[Tensor]:
-    return [module.weight for module in layer]
-
-
-def _biases(layer: Sequence[nn.Linear]) -> list[Tensor]:
-    return [module.bias for module in layer]
 
 
 def _shapes(layer: Sequence[nn.Linear], n: int) -> list[torch.Size]:

@@ -5,7 +5,7 @@ import torch
 from torch import Tensor, nn
 
 from irl.core.flat import linear_layers
-from irl.learners.relu_stack import ReLUStack
+from irl.learners.stack import Stack
 
 HEADS = [(5,), (2, 3)]
 
@@ -23,10 +23,8 @@ def modules(
     return made
 
 
-def stacked(
-    nets: list[tuple[nn.Sequential, list[nn.Linear]]], dtype: torch.dtype = torch.float32
-) -> ReLUStack:
-    return ReLUStack([linear_layers(body) for body, _ in nets], [heads for _, heads in nets], dtype)
+def stacked(nets: list[tuple[nn.Sequential, list[nn.Linear]]], dtype: torch.dtype = torch.float32) -> Stack:
+    return Stack([linear_layers(body) for body, _ in nets], [heads for _, heads in nets], dtype=dtype)
 
 
 def drawn(*shape: int, seed: int = 1) -> Tensor:
