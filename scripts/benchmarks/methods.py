@@ -1,6 +1,6 @@
 """What a method reaches: one run a task and seed, resumed where it was stopped, each as one JSON.
 
-    python scripts/benchmarks/imitation.py dac --tasks Hopper-v5 Walker2d-v5 --steps 150000 --seeds 1 2 3
+    python scripts/benchmarks/methods.py dac --tasks Hopper-v5 Walker2d-v5 --steps 150000 --seeds 1 2 3
 
 Five demonstration episodes of the shelf's expert, the method's own defaults, and the deterministic policy
 at the last step in 20 episodes of seeds that neither training nor tuning used. Cells run one after the
