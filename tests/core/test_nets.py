@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from torch import nn
 
-from irl.core.nets import CLIP, Normaliser, SpectralLinear, fitted_normaliser, linear, mlp
+from irl.core.nets import CLIP, NO_CLIP, Normaliser, SpectralLinear, fitted_normaliser, linear, mlp
 from irl.core.rng import torch_stream
 
 columns = arrays(
@@ -102,6 +102,18 @@ def test_outliers_are_clipped_on_both_sides() -> None:
     normaliser = fitted_normaliser(torch.tensor([[-1.0], [1.0]]))
     out = normaliser(torch.tensor([[1e9], [-1e9], [9.5], [-9.5]]))
     assert out[:, 0].tolist() == [CLIP, -CLIP, 9.5, -9.5]
+
+
+def test_the_bound_is_in_deviations_and_the_callers() -> None:
+    normaliser = Normaliser(1, clip=3.0)
+    normaliser.update(torch.tensor([[3.0], [7.0]]))  # mean 5, deviation 2
+    assert normaliser(torch.tensor([[100.0], [-100.0], [10.0]]))[:, 0].tolist() == [3.0, -3.0, 2.5]
+
+
+def test_no_clip_lets_every_float32_through() -> None:
+    largest = float(np.finfo(np.float32).max)
+    x = torch.tensor([[50.0], [-1e30], [largest], [-largest]])
+    assert torch.equal(Normaliser(1, NO_CLIP)(x), x)
 
 
 def test_unfitted_it_changes_nothing_and_applying_it_never_moves_it() -> None:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from irl.core import state
 from irl.core.log import Logs
+from irl.core.nets import NO_CLIP, Normaliser, fitted_normaliser
 from irl.core.types import Transitions
 from irl.learners.sac import SACConfig, SACLearner
 from irl.rewards.mujoco import HandWritten
@@ -102,6 +103,24 @@ def test_the_exported_policy_acts_as_the_library_predicts() -> None:
     for obs in np.random.default_rng(0).normal(size=(10, 3)):
         predicted, _ = ours.model.predict(obs.astype(np.float32), deterministic=True)
         np.testing.assert_allclose(exported(obs), predicted, atol=1e-5)
+
+
+def test_without_a_normaliser_nothing_is_cut_and_with_one_it_is_cut_at_its_bound() -> None:
+    """What learns, what acts and what is exported agree on it."""
+    obs = torch.tensor([[0.5, -50.0, 12.0]])
+    bounds: list[tuple[Normaliser | None, float]] = [(None, NO_CLIP), (Normaliser(3, 4.0), 4.0)]
+    for normaliser, bound in bounds:
+        ours = SACLearner("Pendulum-v1", [0], SMALL, seed=0, total_steps=600, normaliser=normaliser)
+        seen = ours._update.features(obs)
+        assert torch.equal(seen, obs.clamp(-bound, bound))
+        assert torch.equal(ours.model.actor.features_extractor(obs), seen)
+        assert float(ours.policy().weights["obs_clip"]) == bound
+        ours.close()
+    # the bound of a fitted one is what every policy without its own has
+    fitted = fitted_normaliser(torch.randn(50, 3))
+    ours = SACLearner("Pendulum-v1", [0], SMALL, seed=0, total_steps=600, normaliser=fitted)
+    assert "obs_clip" not in ours.policy().weights
+    ours.close()
 
 
 def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import torch
 from gymnasium.spaces import Box
 from stable_baselines3 import PPO, SAC
 
-from irl.core.nets import fitted_normaliser
+from irl.core.nets import NO_CLIP, Normaliser, fitted_normaliser
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig, SACLearner
 from irl.learners.sb3_export import ALGORITHMS, sb3_zip
@@ -124,6 +124,43 @@ def test_a_trained_sac_policy_acts_the_same_with_and_without_an_absorbing_state(
     content = sb3_zip(ours, spaces.observation_space, spaces.action_space)
     same_actions(ours, loaded(content, "squashed_gaussian", env=spaces))
     spaces.close()
+
+
+def same_everywhere(ours: Policy, theirs: PPO | SAC, obs: np.ndarray) -> None:
+    for row in obs:
+        predicted, _ = theirs.predict(row, deterministic=True)
+        np.testing.assert_allclose(predicted, ours(row), atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("clip", [0.5, 10.0, NO_CLIP])
+def test_the_bound_of_observations_goes_into_the_zip(kind: str, clip: float) -> None:
+    ours = policy(kind, obs_clip=np.array(clip))
+    content = sb3_zip(ours, OBS, ACTION)
+    same_everywhere(ours, loaded(content, kind), 50.0 * np.random.default_rng(0).normal(size=(20, 3)))
+
+
+@pytest.mark.parametrize("absorbing_scale", [0.0, 10.0])
+@pytest.mark.parametrize("normaliser", [None, Normaliser(3, clip=4.0)])
+def test_a_sac_policy_acts_on_observations_of_50_as_its_own_model_does(
+    normaliser: Normaliser | None, absorbing_scale: float
+) -> None:
+    config = SACConfig(steps_per_round=100, learning_starts=50, batch_size=32, hidden=(16,))
+    more = {"normaliser": normaliser, "absorbing_scale": absorbing_scale}
+    learner = SACLearner("Pendulum-v1", [0], config, seed=0, total_steps=100, **more)
+    learner.start(lambda batch: batch.obs[:, 0])
+    learner.collect()
+    ours, venv = learner.policy(), learner.venv
+    assert isinstance(venv.observation_space, Box)
+    assert isinstance(venv.action_space, Box)
+    content = sb3_zip(ours, venv.observation_space, venv.action_space)
+    learner.close()
+    obs = np.array([[50.0, 0, 0], [0, -50.0, 0], [0, 0, 50.0], [12.0, -50.0, 20.0]], dtype=np.float32)
+    # the learner's own networks see the indicator of the absorbing state too
+    own = np.pad(obs, ((0, 0), (0, int(absorbing_scale > 0))))
+    expected, _ = learner.model.predict(own, deterministic=True)
+    np.testing.assert_allclose([ours(row) for row in obs], expected, atol=1e-5)
+    same_everywhere(ours, loaded(content, "squashed_gaussian"), obs)
 
 
 def test_a_trained_ppo_policy_acts_the_same() -> None:

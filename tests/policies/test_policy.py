@@ -13,6 +13,7 @@ from safetensors import safe_open
 from safetensors.numpy import load, load_file, save
 
 from irl.core.errors import UserError
+from irl.core.nets import NO_CLIP
 from irl.core.rng import stream
 from irl.core.types import ActFn
 from irl.learners.ppo import PPOConfig, PPOLearner
@@ -51,7 +52,8 @@ def a_policy(**changes: Any) -> Policy:
 def slow_mean(policy: Policy, obs: np.ndarray) -> tuple[list[float], list[float]]:
     """The last features and the mean before the bounds, one number after the other in float64."""
     w = {name: value.astype(np.float64) for name, value in policy.weights.items()}
-    x = [min(max((o - m) / s, -10.0), 10.0) for o, m, s in zip(obs, w["obs_mean"], w["obs_std"], strict=True)]
+    c = float(w.get("obs_clip", 10.0))
+    x = [min(max((o - m) / s, -c), c) for o, m, s in zip(obs, w["obs_mean"], w["obs_std"], strict=True)]
     act = np.tanh if policy.spec.activation == "tanh" else lambda v: max(v, 0.0)
     depth = len(policy.spec.hidden)
     features = x
@@ -99,6 +101,43 @@ def test_the_bounds_are_met_and_the_observations_clipped() -> None:
     policy = Policy(spec(hidden=()), hand)
     np.testing.assert_allclose(policy(np.array([9.0, 1.0, 0])), [0.5, 0.01], rtol=1e-6)
     np.testing.assert_allclose(policy(np.array([-9.0, 1e9, 0])), [-0.5, 0.1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("clip", [2.0, NO_CLIP])
+def test_a_bound_of_its_own_is_the_formulas_and_comes_back_from_the_file(tmp_path: Path, clip: float) -> None:
+    kind = spec(activation="relu")
+    wide = weights_of(kind) | {"action_low": np.full(2, -1e3), "action_high": np.full(2, 1e3)}
+    policy = Policy(kind, wide | {"obs_clip": np.array(clip)})
+    save_policy(policy, tmp_path / "p.safetensors")
+    loaded = load_policy(tmp_path / "p.safetensors")
+    assert loaded.weights["obs_clip"].shape == ()
+    assert float(loaded.weights["obs_clip"]) == clip
+    moved = 0.0
+    for obs in stream(0, "obs").normal(0, 50, (20, 3)):
+        np.testing.assert_allclose(policy(obs), slow_mean(policy, obs)[1], rtol=1e-5, atol=1e-4)
+        np.testing.assert_array_equal(loaded(obs), policy(obs))
+        moved = max(moved, float(np.abs(policy(obs) - Policy(kind, wide)(obs)).max()))
+    # the bound of 10 is another policy
+    assert moved > 1.0
+
+
+def test_without_a_bound_of_its_own_a_policy_is_the_file_it_always_was(tmp_path: Path) -> None:
+    save_policy(a_policy(), tmp_path / "p.safetensors")
+    assert "obs_clip" not in load_file(tmp_path / "p.safetensors")
+    hand = weights_of(spec())
+    far = np.array([1e3, -1e3, 1e3])
+    ten = Policy(spec(), hand | {"obs_clip": np.array(10.0)})
+    np.testing.assert_array_equal(a_policy()(far), ten(far))
+
+
+@pytest.mark.parametrize(
+    ("bound", "message"),
+    [(0.0, "obs_clip has values that are not positive"), (np.inf, "obs_clip has values that are not finite")],
+)
+def test_a_bound_that_no_training_writes_is_refused(tmp_path: Path, bound: float, message: str) -> None:
+    save_policy(Policy(spec(), weights_of(spec()) | {"obs_clip": np.array(bound)}), tmp_path / "p")
+    with pytest.raises(UserError, match=message):
+        load_policy(tmp_path / "p")
 
 
 def test_samples_of_a_gaussian_have_its_mean_and_deviation() -> None:
@@ -180,6 +219,7 @@ def test_any_reader_of_safetensors_finds_the_weights_and_what_they_mean(tmp_path
         ({"layers.0.weight": np.zeros((6, 4))}, r"layers.0.weight: expected shape \(6, 3\), found \(6, 4\)"),
         ({"layers.2.bias": np.zeros(3)}, r"layers.2.bias: expected shape \(2,\), found \(3,\)"),
         ({"obs_std": np.zeros(4)}, r"obs_std: expected shape \(3,\), found \(4,\)"),
+        ({"obs_clip": np.ones(3)}, r"obs_clip: expected shape \(\), found \(3,\)"),
         ({"action_high": np.zeros(1)}, r"action_high: expected shape \(2,\), found \(1,\)"),
         ({"log_std": np.zeros(1)}, r"log_std: expected shape \(2,\), found \(1,\)"),
         ({"log_std": None}, r"log_std"),
