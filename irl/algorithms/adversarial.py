@@ -1,10 +1,11 @@
 """Adversarial imitation: a discriminator and a learner take turns.
 
 each round:  batch  <- learner.collect()
-             D      <- minibatch steps on (expert, batch)
+             D      <- minibatch steps on (expert, batch and earlier ones)
              policy <- learner.improve(D.reward)
 """
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -12,6 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import torch
 
 from irl.algorithms.loop import Learner, Round
+from irl.algorithms.negatives import Negatives
 from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
 from irl.core.types import Metrics, Transitions
@@ -29,6 +31,26 @@ class ScheduleConfig:
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "batch_size", "epochs")
+
+
+@dataclass(frozen=True)
+class ReplayedScheduleConfig(ScheduleConfig):
+    """The same with longer first rounds, and with the steps of earlier rollouts beside the newest."""
+
+    epochs: int = 5
+    """Passes as long as a rollout in each round, over the steps of the last `negatives` rollouts."""
+    warmup_rounds: int = 5
+    """Rounds of `warmup_epochs` passes before the others."""
+    warmup_epochs: int = 20
+    """Passes in each of them."""
+    negatives: int = 5
+    """Rollouts that steps are drawn from, the newest included: a reward that is told only of the newest
+    policy may forget what was wrong with the ones before it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_at_least(self, 1, "negatives", "warmup_epochs")
+        check_at_least(self, 0, "warmup_rounds")
 
 
 @runtime_checkable
@@ -64,10 +86,18 @@ class Adversarial:
         expert: Transitions,
         schedule: ScheduleConfig,
         rng: torch.Generator,
+        *,
+        absorbing: bool = False,
     ) -> None:
-        """`rng` draws the discriminator's minibatches."""
+        """`rng` draws the discriminator's minibatches.
+
+        With `absorbing` it is shown rollouts whose terminations lead into the absorbing state; `expert` then
+        does too. The learner is rewarded for the steps it took.
+        """
         self.learner, self.discriminator = learner, discriminator
         self.expert, self.schedule, self.rng = expert, schedule, rng
+        replayed = schedule.negatives if isinstance(schedule, ReplayedScheduleConfig) else 1
+        self._negatives = Negatives(replayed, absorbing)
         self.index = 0
         learner.start(discriminator.reward)
 
@@ -85,11 +115,22 @@ class Adversarial:
             self.index += 1
             yield Round(self.index, self.learner.env_steps, metrics)
 
+    @property
+    def _epochs(self) -> int:
+        """Passes of the round that is under way."""
+        schedule = self.schedule
+        if isinstance(schedule, ReplayedScheduleConfig) and self.index < schedule.warmup_rounds:
+            return schedule.warmup_epochs
+        return schedule.epochs
+
     def _fit(self, policy: Transitions) -> Metrics:
+        drawn = self._negatives.with_newest(policy)
+        size = self.schedule.batch_size
+        of_one_pass = max(len(policy) // size, 1)
         updates = [
             self.discriminator.update(self.expert.sample(len(batch), self.rng), batch)
-            for _ in range(self.schedule.epochs)
-            for batch in policy.minibatches(self.schedule.batch_size, self.rng)
+            for _ in range(self._epochs)
+            for batch in itertools.islice(drawn.minibatches(size, self.rng), of_one_pass)
         ]
         check_finite(named("discriminator", self.discriminator.state_dict()["net"]))
         means = {name: sum(u[name] for u in updates) / len(updates) for name in updates[0]}
@@ -100,6 +141,7 @@ class Adversarial:
         return {
             "learner": self.learner.state_dict(),
             "discriminator": self.discriminator.state_dict(),
+            "negatives": self._negatives.state_dict(),
             "rng": self.rng.get_state(),
             "index": self.index,
         }
@@ -108,5 +150,6 @@ class Adversarial:
         """Go on where another run of the same settings was."""
         self.learner.load_state_dict(state["learner"])
         self.discriminator.load_state_dict(state["discriminator"])
+        self._negatives.load_state_dict(state.get("negatives", []), self.expert.obs.device)
         self.rng.set_state(state["rng"])
         self.index = state["index"]

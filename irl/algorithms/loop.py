@@ -4,6 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from jaxtyping import Float
+from torch import Tensor
+
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.policies.policy import Policy
 
@@ -37,6 +40,10 @@ class Learner(Protocol):
         ...
 
     def collect(self) -> Transitions: ...
+    def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """Log density of the batch's own actions under the current policy; asking changes nothing."""
+        ...
+
     def improve(self, reward: RewardFn) -> Metrics: ...
     def take_finished(self) -> list[tuple[float, int]]: ...
     def policy(self) -> Policy: ...

@@ -33,6 +33,15 @@ DECLARED: dict[str, tuple[str, str]] = {
     "discriminator/accuracy_policy": ("share of this rollout's steps called policy, at the round's end", "1"),
     "discriminator/logit_expert": ("mean logit of the demonstrations, at the round's end", "nats"),
     "discriminator/logit_policy": ("mean logit of this rollout, at the round's end", "nats"),
+    "airl/log_pi_expert": (
+        "mean log density of the demonstrations' actions under the policy, bounded, mean over the round",
+        "nats",
+    ),
+    "airl/log_pi_policy": (
+        "mean log density of the policy's own actions, earlier rollouts' too, bounded, mean over the round",
+        "nats",
+    ),
+    "airl/log_pi_at_bound": ("share of those densities that the bound cut, mean over the round", "1"),
     "ppo/approx_kl": ("divergence of the old policy from the new one, mean over the last pass", "nats"),
     "ppo/clip_fraction": ("share of probability ratios beyond the clip range", "1"),
     "ppo/value_loss": ("squared error of the value, scaled reward", "1"),

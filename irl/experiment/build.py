@@ -12,10 +12,19 @@ from irl.core.errors import UserError
 from irl.core.nets import Normaliser, fitted_normaliser
 from irl.core.rng import episode_seeds, stream, torch_stream
 from irl.core.types import Episode, Transitions
-from irl.discriminators.dac import DAC
+from irl.discriminators.airl import AIRL, AIRLConfig
+from irl.discriminators.dac import DAC, DACConfig
 from irl.discriminators.gail import GAIL
 from irl.envs.absorbing import subsample
-from irl.experiment.configs import DACRun, ExpertRun, GAILRun, Imitation, RetrainRun
+from irl.experiment.configs import (
+    AIRLRun,
+    AIRLSACRun,
+    DACRun,
+    ExpertRun,
+    GAILSACRun,
+    Imitation,
+    RetrainRun,
+)
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig, SACLearner
 from irl.rewards.artefact import LearnedReward
@@ -32,11 +41,16 @@ def check_device(device: str) -> None:
         raise UserError("--device cuda, but torch sees no GPU here; leave it out to train on the CPU")
 
 
+def absorbing_scale(config: Imitation) -> float:
+    """Distance of the absorbing state that the discriminator knows; 0 where it knows none."""
+    of = config.discriminator
+    return of.scale if isinstance(of, AIRLConfig) else of.absorbing_scale
+
+
 def demonstrations(config: Imitation, episodes: Sequence[Episode]) -> Transitions:
     """The steps to learn from: thinned and led into the absorbing state where the settings say so."""
     rng = stream(config.seed, "demonstration steps")
-    absorbing = config.discriminator.absorbing_scale > 0
-    return subsample(episodes, config.demo_rate, rng, absorbing=absorbing)
+    return subsample(episodes, config.demo_rate, rng, absorbing=absorbing_scale(config) > 0)
 
 
 def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | Interleaved:
@@ -44,28 +58,35 @@ def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | I
     expert = demonstrations(config, episodes)
     real = expert.obs if expert.absorbing is None else expert.obs[~expert.absorbing]
     normaliser = fitted_normaliser(real)
-    make = DAC if isinstance(config, DACRun) else GAIL
-    discriminator = make(
-        expert.obs.shape[1],
-        expert.action.shape[1],
-        config.discriminator,
-        # copies: each side moves its own to its device
-        normaliser=copy.deepcopy(normaliser),
-        init_rng=torch_stream(config.seed, "discriminator weights"),
-        rng=torch_stream(config.seed, "discriminator", config.device),
-        gamma=config.learner.gamma,
-    )
+    scale = absorbing_scale(config)
+    # a copy for each side: both move their own to their device
+    learner = _learner(config, copy.deepcopy(normaliser), scale)
+    discriminator = _discriminator(config, expert, normaliser, learner)
     rng = torch_stream(config.seed, "minibatches", config.device)
-    seeds = episode_seeds(config.seed, "training", config.learner.n_envs)
-    run = {"seed": config.seed, "total_steps": config.steps, "device": config.device}
-    run["normaliser"] = normaliser
     expert = expert.to(config.device)
-    if isinstance(config, GAILRun):
-        on_policy = PPOLearner(config.env_id, seeds, config.learner, **run)
-        return Adversarial(on_policy, discriminator, expert, config.schedule, rng)
-    scale = config.discriminator.absorbing_scale
-    off_policy = SACLearner(config.env_id, seeds, config.learner, absorbing_scale=scale, **run)
-    return Interleaved(off_policy, discriminator, expert, config.schedule, rng)
+    if isinstance(config, GAILSACRun | DACRun | AIRLSACRun):
+        return Interleaved(learner, discriminator, expert, config.schedule, rng)
+    absorbing = isinstance(config, AIRLRun) and scale > 0
+    return Adversarial(learner, discriminator, expert, config.schedule, rng, absorbing=absorbing)
+
+
+def _discriminator(
+    config: Imitation, expert: Transitions, normaliser: Normaliser, learner: PPOLearner | SACLearner
+) -> GAIL | AIRL:
+    sizes = expert.obs.shape[1], expert.action.shape[1]
+    shared = {
+        "normaliser": normaliser,
+        "init_rng": torch_stream(config.seed, "discriminator weights"),
+        "rng": torch_stream(config.seed, "discriminator", config.device),
+        "gamma": config.learner.gamma,
+    }
+    match config.discriminator:
+        case AIRLConfig() as settings:
+            return AIRL(*sizes, settings, log_pi=learner.log_pi, **shared)
+        case DACConfig() as settings:
+            return DAC(*sizes, settings, **shared)
+        case settings:
+            return GAIL(*sizes, settings, **shared)
 
 
 def forward(config: ExpertRun) -> Forward:
@@ -85,7 +106,7 @@ def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
 
 
 def _learner(
-    config: ExpertRun | RetrainRun, normaliser: Normaliser | None = None, absorbing_scale: float = 0.0
+    config: Imitation | ExpertRun | RetrainRun, normaliser: Normaliser | None = None, scale: float = 0.0
 ) -> PPOLearner | SACLearner:
     seeds = episode_seeds(config.seed, "training", config.learner.n_envs)
     run = {"seed": config.seed, "total_steps": config.steps, "device": config.device}
@@ -94,4 +115,4 @@ def _learner(
         case PPOConfig() as settings:
             return PPOLearner(config.env_id, seeds, settings, **run)
         case SACConfig() as settings:
-            return SACLearner(config.env_id, seeds, settings, absorbing_scale=absorbing_scale, **run)
+            return SACLearner(config.env_id, seeds, settings, absorbing_scale=scale, **run)

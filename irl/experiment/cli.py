@@ -12,7 +12,7 @@ from rich.console import Console
 
 from irl.core.errors import UserError
 from irl.experiment import demonstrations, evaluate, experts, export, retrain, train
-from irl.experiment.configs import DACRun, GAILRun, GAILSACRun
+from irl.experiment.configs import AIRLRun, AIRLSACRun, DACRun, GAILRun, GAILSACRun
 from irl.experiment.play import Interrupted
 
 Run = Callable[[Any], None]
@@ -24,6 +24,8 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("train", "gail"): (GAILRun, train.train),
     ("train", "gail-sac"): (GAILSACRun, train.train),
     ("train", "dac"): (DACRun, train.train),
+    ("train", "airl"): (AIRLRun, train.train),
+    ("train", "airl-sac"): (AIRLSACRun, train.train),
     ("train",): (train.Resume, train.go_on),
     ("evaluate",): (evaluate.Evaluate, evaluate.evaluate),
     ("retrain",): (retrain.Retrain, retrain.retrain),

@@ -4,9 +4,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar, Literal, TypeVar
 
-from irl.algorithms.adversarial import ScheduleConfig
+from irl.algorithms.adversarial import ReplayedScheduleConfig, ScheduleConfig
 from irl.algorithms.interleaved import InterleavedConfig
 from irl.core.config import check_at_least, check_seed, check_threads
+from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
 from irl.envs.tasks import task_name
@@ -121,7 +122,51 @@ class DACRun(ImitationRun):
     schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
 
 
-Imitation = GAILRun | GAILSACRun | DACRun
+@dataclass(frozen=True)
+class AIRLRun(ImitationRun):
+    """Adversarial inverse reinforcement learning with PPO: a reward that can be taken elsewhere."""
+
+    KIND: ClassVar[str] = "airl"
+    demo_episodes: int = 5
+    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
+    steps: int = 1_000_000
+    """Environment steps in all."""
+    learner: PPOConfig = field(default_factory=PPOConfig)
+    discriminator: AIRLConfig = field(default_factory=AIRLConfig)
+    schedule: ReplayedScheduleConfig = field(default_factory=ReplayedScheduleConfig)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.discriminator.reward == "f-log-pi" and self.learner.ent_coef > 0:
+            raise ValueError(
+                f"entropy would be paid twice: discriminator.reward is f-log-pi and learner.ent_coef is "
+                f"{self.learner.ent_coef}; set one of --learner.ent-coef 0 and --discriminator.reward f"
+            )
+
+
+@dataclass(frozen=True)
+class AIRLSACRun(ImitationRun):
+    """Adversarial inverse reinforcement learning with SAC, on the steps of its whole memory."""
+
+    KIND: ClassVar[str] = "airl-sac"
+    demo_episodes: int = 5
+    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
+    steps: int = 150_000
+    """Environment steps in all."""
+    learner: SACConfig = OFF_POLICY
+    discriminator: AIRLConfig = field(default_factory=lambda: AIRLConfig(lr=3e-4, reward="f"))
+    schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.discriminator.reward == "f-log-pi":
+            raise ValueError(
+                "entropy would be paid twice: SAC has an entropy bonus of its own, and discriminator.reward "
+                "is f-log-pi; use --discriminator.reward f"
+            )
+
+
+Imitation = GAILRun | GAILSACRun | DACRun | AIRLRun | AIRLSACRun
 """Every method there is, by its `KIND`."""
 
 

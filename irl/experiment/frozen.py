@@ -14,18 +14,19 @@ from irl.envs.make import make
 from irl.experiment.configs import RetrainRun
 from irl.experiment.snapshots import snapshot_of
 from irl.rewards.artefact import WEIGHTS, LearnedReward, load_reward
+from irl.rewards.shaped import PARTS
 
 RECORD = "reward.json"
 """Says in the run folder which reward it is."""
 
 
-def frozen(config: RetrainRun, snapshot: Path) -> LearnedReward:
-    """The reward of a snapshot, once it is known to be of the task and the task is known to start.
+def frozen(config: RetrainRun, snapshot: Path, part: str | None = None) -> LearnedReward:
+    """The reward of a snapshot, or `part` of it, once it is known to be of a task that starts.
 
     Raises:
         UserError: it is missing, damaged, or of another task; or the task cannot be started.
     """
-    reward = load_reward(place := snapshot / "reward")
+    reward = load_reward(place := snapshot / "reward", part)
     env = make(config.env_id)
     try:
         takes = reward.spec.net.obs_dim, reward.spec.net.action_dim
@@ -70,7 +71,9 @@ def frozen_again(config: RetrainRun, folder: RunFolder) -> LearnedReward:
             f"new place into {folder.path / 'config.json'} as run"
         )
     _, snapshot = snapshot_of(open_run(config.run), config.snapshot)
-    reward, before = frozen(config, snapshot), files.read_json(record := folder.path / RECORD)
+    before = files.read_json(record := folder.path / RECORD)
+    paid = before.get("reward_map") if isinstance(before, dict) else None
+    reward = frozen(config, snapshot, paid if paid in PARTS else None)
     now = recorded(config, reward, snapshot)
     # a run may be renamed
     if not isinstance(before, dict) or without(before, ("run",)) != without(now, ("run",)):

@@ -42,6 +42,8 @@ class Retrain:
     """Run folder of `irl retrain` to go on with, by its own settings; no other is needed."""
     snapshot: int | None = None
     """Step of the snapshot; the last one unless given."""
+    part: Literal["g", "f"] | None = None
+    """Of AIRL's reward: g, what a step is worth, or f, the same shaped by h; g unless given."""
     algo: Literal["ppo", "sac"] | None = None
     """Which learner; the run's own unless given."""
     steps: int | None = None
@@ -49,7 +51,7 @@ class Retrain:
     seed: int | None = None
     """Seed of everything random; the run's + 1000 unless given."""
     out: Path | None = None
-    """Run folder; runs/retrain-<run>-<step>-<algo>-s<seed> unless given."""
+    """Run folder; runs/retrain-<run>-<step>[-<part>]-<algo>-s<seed> unless given."""
     policies_root: Path | None = None
     """Where the shelf is, whose card gives the score; expert_data/policies unless given."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
@@ -101,7 +103,7 @@ def _begun(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:
     build.check_device(command.device)
     step, snapshot = snapshot_of(source, command.snapshot)
     config = _settled(command, its, step)
-    reward = frozen(config, snapshot)
+    reward = frozen(config, snapshot, command.part)
     there = records.RunFolder(config.out)
     if (config.out / "config.json").is_file() and there.config.get("kind") == RetrainRun.KIND:
         raise UserError(
@@ -122,13 +124,14 @@ def _settled(command: Retrain, its: Any, step: int) -> RetrainRun:
             raise UserError(f"--{name}.* are settings of a learner that is not used; choose --algo {name}")
     seed = (its.seed + SEED_APART) % (MOST_SEED + 1) if command.seed is None else command.seed
     source = command.run.resolve()
+    of = f"-{command.part}" if command.part else ""
     return RetrainRun(
         run=source,
         snapshot=step,
         env_id=its.env_id,
         steps=its.steps if command.steps is None else command.steps,
         seed=seed,
-        out=command.out or Path("runs") / f"retrain-{source.name}-{step}-{algo}-s{seed}",
+        out=command.out or Path("runs") / f"retrain-{source.name}-{step}{of}-{algo}-s{seed}",
         learner=command.ppo if algo == "ppo" else command.sac,
         watch=command.watch,
         device=command.device,

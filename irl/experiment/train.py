@@ -13,6 +13,7 @@ from irl.core.config import from_json, to_json
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
 from irl.demos.load import Demos
+from irl.discriminators.airl import AIRL
 from irl.discriminators.gail import GAIL
 from irl.envs.make import check_module
 from irl.experiment import build
@@ -95,13 +96,13 @@ def play(config: Imitation, demos: Demos, folder: records.RunFolder) -> None:
 def _snapshot(config: Imitation, demos: Demos, algorithm: Adversarial | Interleaved, path: Path) -> None:
     """The policy, and the reward that the round just done was rewarded by; untrained at step 0."""
     learner, discriminator = algorithm.learner, algorithm.discriminator
-    assert isinstance(discriminator, GAIL)
+    assert isinstance(discriminator, GAIL | AIRL)
     save_policy(learner.policy(), path / "policy.safetensors")
     spec = RewardSpec(
         env_id=config.env_id,
         method=config.KIND,
         reward_map=discriminator.reward_map,
-        inputs="obs, action",
+        inputs=_inputs(discriminator),
         net=discriminator.net.spec,
         gamma=config.learner.gamma,
         reward_scale=learner.reward_scale,
@@ -109,3 +110,8 @@ def _snapshot(config: Imitation, demos: Demos, algorithm: Adversarial | Interlea
         provenance=drawn(demos) | {"seed": config.seed},
     )
     save_reward(path / "reward", spec, discriminator.net)
+
+
+def _inputs(discriminator: GAIL | AIRL) -> str:
+    sees_all = isinstance(discriminator, GAIL) or discriminator.net.spec.inputs == "obs_action"
+    return "obs, action" if sees_all else "obs"

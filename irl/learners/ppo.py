@@ -20,6 +20,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import torch
 from gymnasium.spaces import Box
+from jaxtyping import Float
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
@@ -28,6 +29,7 @@ from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
 from irl.core.nets import ACTIVATIONS, Normaliser
 from irl.core.types import Metrics, RewardFn, Transitions
+from irl.learners import densities
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
 from irl.learners.ppo_update import PPOUpdate
@@ -194,6 +196,20 @@ class PPOLearner:
         model.collect_rollouts(self.venv, self._callback, model.rollout_buffer, model.n_steps)
         self._batch = self.venv.take().to(model.device)
         return self._batch
+
+    @torch.no_grad()
+    def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """Log density of the batch's own actions, as the environment saw them, under the current policy.
+
+        `irl.learners.densities.clipped`; no normaliser moves and nothing is drawn.
+        """
+        policy, box = self.model.policy, self.venv.action_space
+        assert isinstance(box, Box)
+        policy.set_training_mode(False)
+        normal = policy.get_distribution(batch.obs).distribution
+        assert isinstance(normal, torch.distributions.Normal)
+        low, high = (torch.as_tensor(bound, device=batch.obs.device) for bound in (box.low, box.high))
+        return densities.clipped(batch.action, normal.mean, normal.stddev.log(), low, high)
 
     def improve(self, reward: RewardFn) -> Metrics:
         """Reward the last rollout in one batch and do PPO's gradient steps on it.

@@ -25,6 +25,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import torch
 from gymnasium.spaces import Box
+from jaxtyping import Float
 from stable_baselines3 import SAC
 from stable_baselines3.sac.policies import Actor
 from torch import Tensor, nn
@@ -34,6 +35,7 @@ from irl.core.finite import check_finite, named
 from irl.core.nets import CLIP, NO_CLIP, Normaliser, linear
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions
+from irl.learners import densities
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures, Spaces, widened
 from irl.learners.heads import Lowest, Quantiles
@@ -259,6 +261,16 @@ class SACLearner:
         check_finite({"reward of a drawn batch": reward})
         remaining = 1.0 - self._env_steps / self._total_steps
         self._update(batch, reward, self._rate(remaining) if callable(self._rate) else self._rate)
+
+    @torch.no_grad()
+    def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """Log density of the batch's own actions, in environment units, under the current policy.
+
+        `irl.learners.densities.squashed`; no normaliser moves and nothing is drawn.
+        """
+        features = self._update.features(batch.obs, batch.absorbing)
+        half = torch.as_tensor((self._high - self._low) / 2, device=batch.obs.device)
+        return densities.squashed(self._update.scaled(batch.action), *self._update.gaussian(features), half)
 
     def improve(self, reward: RewardFn) -> Metrics:
         """Name the reward of the next rounds; what the last update was like."""

@@ -197,6 +197,11 @@ class SACUpdate:
         """Actions within [-1, 1] for normalised observations."""
         return self._sampled(self._actor(features)[0][0]).action
 
+    def gaussian(self, features: Float[Tensor, "B F"]) -> tuple[Float[Tensor, "B A"], Float[Tensor, "B A"]]:
+        """Mean and log deviation of the actions before the squashing."""
+        mean, log_std = self._actor(features)[0][0].chunk(2, dim=1)
+        return mean, log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
+
     def _sampled(self, outputs: Float[Tensor, "B C"]) -> _Drawn:
         mean, log_std = outputs.chunk(2, dim=1)
         noise = torch.randn(mean.shape, generator=self.rng, device=mean.device)

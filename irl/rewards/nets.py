@@ -12,6 +12,7 @@ bounds what the logit can gain per distance, s_abs must lie far from all of them
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import torch
 from jaxtyping import Float
@@ -26,6 +27,7 @@ from irl.core.types import Transitions
 class LogitSpec:
     """The shape of a logit network."""
 
+    KIND: ClassVar[str] = "logit"
     obs_dim: int
     action_dim: int
     hidden: tuple[int, ...] = (100, 100)
@@ -42,6 +44,11 @@ class LogitSpec:
     def inputs(self) -> int:
         """Numbers the perceptron sees."""
         return self.obs_dim + self.action_dim + (self.absorbing_scale > 0)
+
+    @property
+    def sizes(self) -> tuple[tuple[int, ...], ...]:
+        """Units of each layer of the one perceptron there is."""
+        return ((self.inputs, *self.hidden, 1),)
 
 
 class LogitNet(nn.Module):

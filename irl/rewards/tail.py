@@ -28,7 +28,18 @@ def reward(net: LogitNet, reward_map: str, batch: Transitions, gamma: float) -> 
     of_steps = MAPS[reward_map](net(batch))
     if not net.spec.absorbing_scale or not bool(batch.terminated.any()):
         return of_steps
+    return added(of_steps, MAPS[reward_map](net.of_absorbing()), batch, gamma)
+
+
+def added(
+    of_steps: Float[Tensor, "B"], of_absorbing: Float[Tensor, "1"], batch: Transitions, gamma: float
+) -> Float[Tensor, "B"]:
+    """The rewards of steps, and what s_abs pays for ever after where the task ended.
+
+    Raises:
+        ValueError: gamma is not below 1.
+    """
     if not 0.0 <= gamma < 1.0:
         raise ValueError(f"the absorbing state pays for ever: gamma must be in [0, 1), not {gamma}")
-    tail = gamma / (1.0 - gamma) * MAPS[reward_map](net.of_absorbing())
+    tail = gamma / (1.0 - gamma) * of_absorbing
     return of_steps + torch.where(batch.terminated, tail, torch.zeros_like(tail))

@@ -29,7 +29,7 @@ EPISODES = 25
 class Settings:
     """Which cells to run."""
 
-    method: Annotated[Literal["gail", "gail-sac", "dac"], tyro.conf.Positional]
+    method: Annotated[Literal["gail", "gail-sac", "dac", "airl", "airl-sac"], tyro.conf.Positional]
     """Name of the `irl train` command."""
     tasks: tuple[str, ...] = ("Hopper-v5",)
     """Gymnasium ids."""
