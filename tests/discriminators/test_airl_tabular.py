@@ -2,9 +2,9 @@
 
     action 0 stays, action 1 goes on around a ring;   r(s) is 0, 1, -1/2 or 2
 
-Each state and the next are reached in one step from one state, so that g(s) is the reward up to one constant
-for all, and h the soft value up to one (Fu et al. 2018, arXiv:1710.11248). Policies and occupancies are exact:
-what is wrong is wrong in the discriminator.
+Each state and the next are reached in one step from one state, so that g(s) is the reward up to one
+constant for all, and h the soft value up to one (Fu et al. 2018, arXiv:1710.11248). Policies and
+occupancies are exact: what is wrong is wrong in the discriminator.
 """
 
 import torch
@@ -33,7 +33,7 @@ def table(visits: Tensor) -> Transitions:
 def soft_optimal(reward: Tensor) -> tuple[Tensor, Tensor]:
     """Policy [state, action] and value of the best sum of reward and entropy; reward [state, action]."""
     value = torch.zeros(N)
-    for _ in range(300):
+    for _ in range(100):
         q = reward + GAMMA * value[NEXT]
         value = torch.logsumexp(q, 1)
     return torch.softmax(reward + GAMMA * value[NEXT], 1), value
@@ -56,17 +56,19 @@ def test_g_is_the_reward_and_h_the_value_each_up_to_a_constant() -> None:
     airl = AIRL(
         N,
         2,
-        AIRLConfig(inputs="obs", hidden=(), potential_hidden=(), lr=0.03, terminal="mask", gradient_penalty=0.0),
+        AIRLConfig(
+            inputs="obs", hidden=(), potential_hidden=(), lr=0.1, terminal="mask", gradient_penalty=0.0
+        ),
         log_pi=log_pi,
         gamma=GAMMA,
         normaliser=Normaliser(N),
         init_rng=torch_stream(0, "weights"),
         rng=torch_stream(0, "rest"),
     )
-    for round_ in range(120):
-        if round_ == 80:
-            airl.optimizer.param_groups[0]["lr"] = 0.003
-        for _ in range(15):
+    for round_ in range(40):
+        if round_ == 25:
+            airl.optimizer.param_groups[0]["lr"] = 0.01
+        for _ in range(8):
             airl.update(table(visited(expert)), table(visited(policy)))
         with torch.no_grad():
             f = airl.net.f(table(visited(policy)), GAMMA).reshape(N, 2)

@@ -73,7 +73,9 @@ def test_squashed_keeps_its_digits_where_tanh_has_none_and_is_finite_at_the_boun
     u = torch.linspace(-6.0, 6.0, 25)
     ones, half = torch.ones(25, 1), torch.ones(1)
     exact = u.double()
-    expected = -0.5 * (exact - 1).square() - 0.5 * math.log(2 * math.pi) - torch.log(1 - exact.tanh().square())
+    expected = (
+        -0.5 * (exact - 1).square() - 0.5 * math.log(2 * math.pi) - torch.log(1 - exact.tanh().square())
+    )
     # float32's tanh keeps u to a hundredth at 6
     found = densities.squashed(u.tanh()[:, None], ones, 0 * ones, half)
     torch.testing.assert_close(found.double(), expected, atol=0.1, rtol=0.02)
@@ -88,7 +90,9 @@ def test_squashed_knows_the_scale_of_the_actions() -> None:
     )
     assert float(ratio) == pytest.approx(-math.log(2.0) - math.log(0.5), abs=1e-6)
     wide = densities.squashed(action, zeros, zeros, torch.tensor([3.0, 1.0]))
-    assert float(wide - densities.squashed(action, zeros, zeros, torch.ones(2))) == pytest.approx(-math.log(3))
+    assert float(wide - densities.squashed(action, zeros, zeros, torch.ones(2))) == pytest.approx(
+        -math.log(3)
+    )
 
 
 def a_ppo(env_id: str = "PointMass-v0") -> PPOLearner:
@@ -121,7 +125,11 @@ def test_ppos_log_pi_is_that_of_the_batchs_own_clipped_actions() -> None:
     for a, m in zip(batch.action[row].tolist(), mean[row].tolist(), strict=True):
         normal = torch.distributions.Normal(m, std)
         edge = 1.0 - 2.0 * densities.EDGE
-        mass = float(normal.cdf(torch.tensor(-edge))) if a <= -edge else 1.0 - float(normal.cdf(torch.tensor(edge)))
+        mass = (
+            float(normal.cdf(torch.tensor(-edge)))
+            if a <= -edge
+            else 1.0 - float(normal.cdf(torch.tensor(edge)))
+        )
         by_hand += math.log(mass) if abs(a) >= edge else float(normal.log_prob(torch.tensor(a)))
     assert float(ours.log_pi(batch[row : row + 1])) == pytest.approx(by_hand, abs=1e-4)
 

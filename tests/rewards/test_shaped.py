@@ -27,7 +27,9 @@ def episode(end: str, seed: int = 0) -> Transitions:
 
 def net(scale: float = 0.0, inputs="obs_action") -> ShapedNet:
     spec = ShapedSpec(3, 2, (8,), (7,), inputs=inputs, absorbing_scale=scale)
-    return ShapedNet(spec, fitted_normaliser(episode("truncated").obs), torch_stream(1, "net")).requires_grad_(False)
+    return ShapedNet(
+        spec, fitted_normaliser(episode("truncated").obs), torch_stream(1, "net")
+    ).requires_grad_(False)
 
 
 def discounted(values: Tensor) -> float:
@@ -81,9 +83,7 @@ def test_h_is_left_out_at_a_termination_and_nowhere_else() -> None:
 def test_it_is_the_equation_row_by_row() -> None:
     g, now, after = (torch.randn(5, generator=torch_stream(0, name)) for name in ("g", "now", "after"))
     kept = torch.tensor([1.0, 0.0, 1.0, 1.0, 0.0])
-    expected = [
-        float(g[i]) + 0.97 * float(kept[i]) * float(after[i]) - float(now[i]) for i in range(len(g))
-    ]
+    expected = [float(g[i]) + 0.97 * float(kept[i]) * float(after[i]) - float(now[i]) for i in range(len(g))]
     torch.testing.assert_close(shaped(g, now, after, kept, 0.97), torch.tensor(expected))
 
 
