@@ -146,7 +146,7 @@ def _specification(folder: Path, content: Any) -> RewardSpec:
         raise ValueError(f"{WEIGHTS} has sha256 {digest[:12]}, {SPEC} says {named!r:.14}")
     if version < VERSION and isinstance(content.get("net"), dict):
         added = ADDED_IN_2 if version == 1 else {}
-        content["net"] = {"kind": LogitSpec.KIND} | added | content["net"]
+        content["net"] = added | content["net"] | {"kind": LogitSpec.KIND}
     spec = from_json(RewardSpec, content, SPEC)
     if spec.reward_map not in (known := _payable(spec.net)):
         raise ValueError(f"unknown map {spec.reward_map!r}; known: {', '.join(known)}")

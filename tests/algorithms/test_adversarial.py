@@ -1,12 +1,13 @@
 """The adversarial loop: its order, and that it learns a task that survival alone does not solve."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from irl.algorithms.adversarial import Adversarial, ScheduleConfig
+from irl.algorithms.adversarial import Adversarial, ReplayedScheduleConfig, ScheduleConfig
 from irl.algorithms.loop import BeforeUpdate
 from irl.core.finite import NotFinite
 from irl.core.nets import fitted_normaliser
@@ -55,7 +56,7 @@ class Told:
     def _not_asked(self) -> Any:
         raise AssertionError("a round asks for no such thing")
 
-    take_finished = policy = close = _not_asked
+    take_finished = policy = close = log_pi = _not_asked
 
     def state_dict(self) -> dict[str, Any]:
         return {"net": {}}
@@ -77,6 +78,47 @@ def test_the_discriminator_learns_before_the_rollout_is_rewarded() -> None:
     assert rounds[0].metrics["discriminator/loss"] == 1.0
     assert rounds[0].metrics["discriminator/accuracy_expert"] == 1.0
     assert rounds[0].metrics["discriminator/accuracy_policy"] == 0.0
+
+
+def test_a_round_reports_the_mean_over_all_its_minibatches() -> None:
+    class Counting(Told):
+        def update(self, expert: Transitions, policy: Transitions) -> Metrics:
+            super().update(expert, policy)
+            return {"discriminator/loss": float(len(self.calls))}
+
+    told = Counting()
+    expert = from_episodes(pointmass.demonstrations(2))
+    loop = Adversarial(told, told, expert, ScheduleConfig(15, epochs=2), torch_stream(0, "minibatches"))
+    # after "start" and "collect" four updates, the 3rd to the 6th call
+    assert next(loop.rounds(30)).metrics["discriminator/loss"] == pytest.approx((3 + 4 + 5 + 6) / 4)
+
+
+def test_the_first_rounds_are_longer_and_earlier_rollouts_are_shown_again() -> None:
+    class Numbered(Told):
+        """Rollout i has i everywhere."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.seen: list[set[float]] = []
+
+        def collect(self) -> Transitions:
+            self.seen.append(set())
+            batch = super().collect()
+            return replace(batch, obs=torch.full_like(batch.obs, len(self.seen)))
+
+        def update(self, expert: Transitions, policy: Transitions) -> Metrics:
+            self.seen[-1] |= set(policy.obs.flatten().tolist())
+            return super().update(expert, policy)
+
+    told = Numbered()
+    schedule = ReplayedScheduleConfig(10, epochs=4, warmup_rounds=2, warmup_epochs=6, negatives=2)
+    expert = from_episodes(pointmass.demonstrations(2))
+    loop = Adversarial(told, told, expert, schedule, torch_stream(0, "minibatches"))
+    list(loop.rounds(4 * pointmass.STEPS))
+    rounds = " ".join(told.calls).split("collect")[1:]
+    # a pass is as long as a rollout, three minibatches, however many rollouts it draws from
+    assert [said.count("update 10 10") for said in rounds] == [18, 18, 12, 12]
+    assert told.seen == [{1.0}, {1.0, 2.0}, {2.0, 3.0}, {3.0, 4.0}]
 
 
 def _gail(seed: int, trained: bool = True) -> Adversarial:

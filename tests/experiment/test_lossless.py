@@ -16,12 +16,14 @@ from irl.experiment.cli import main
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 from tests.experiment.conftest import QUICK, TASK
+from tests.experiment.test_train_airl import PPO
 from tests.experiment.test_train_dac import SMALL
 
 Command = Callable[..., None]
 Train = Callable[..., Path]
 
 GAIL = ("train", "gail", "--env-id", TASK, *QUICK, "--watch.checkpoint-every-s=0")
+AIRL = ("train", "airl", "--env-id", TASK, *PPO, "--watch.checkpoint-every-s=0")
 RESUME = ("train", "--resume")
 DAC = ("train", "dac", "--env-id", TASK, *SMALL, "--watch.checkpoint-every-s=0")
 SAC = (
@@ -79,8 +81,13 @@ def ends(run: Path) -> tuple[list[bytes], list[dict]]:
 
 @pytest.mark.parametrize(
     ("start", "resume"),
-    [(GAIL, RESUME), (DAC, RESUME), (SAC, ("experts", "train", "--policies-root", "shelf", "--resume"))],
-    ids=["gail", "dac", "sac expert"],
+    [
+        (GAIL, RESUME),
+        (AIRL, RESUME),
+        (DAC, RESUME),
+        (SAC, ("experts", "train", "--policies-root", "shelf", "--resume")),
+    ],
+    ids=["gail", "airl", "dac", "sac expert"],
 )
 def test_killed_twice_it_ends_as_if_it_had_not_been(
     start: tuple[str, ...], resume: tuple[str, ...], irl: Command

@@ -87,8 +87,9 @@ def test_it_takes_raw_observations_and_is_frozen(folder: Path) -> None:
 
 def test_the_specification_is_plain_json(folder: Path) -> None:
     content = json.loads((folder / SPEC).read_text())
-    assert (content["format"], content["version"]) == ("irl.reward", 2)
+    assert (content["format"], content["version"]) == ("irl.reward", 3)
     assert content["net"] == {
+        "kind": "logit",
         "obs_dim": 3,
         "action_dim": 2,
         "hidden": [5, 4],
@@ -101,13 +102,15 @@ def test_the_specification_is_plain_json(folder: Path) -> None:
     assert sorted(path.name for path in folder.iterdir()) == [SPEC, WEIGHTS]
 
 
-def test_a_reward_of_version_1_is_read_as_it_was(folder: Path) -> None:
-    def as_version_1(content: dict[str, Any]) -> None:
-        content["version"] = 1
-        del content["net"]["absorbing_scale"], content["net"]["spectral_norm"]
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_reward_of_an_older_version_is_read_as_it_was(folder: Path, version: int) -> None:
+    def as_it_was(content: dict[str, Any]) -> None:
+        content["version"] = version
+        for name in ("kind", "absorbing_scale", "spectral_norm") if version == 1 else ("kind",):
+            del content["net"][name]
 
     now = load_reward(folder)
-    edit(folder, as_version_1)
+    edit(folder, as_it_was)
     before = load_reward(folder)
     assert before.spec == now.spec
     assert torch.equal(before(batch()), now(batch()))
@@ -158,8 +161,8 @@ def test_a_place_without_a_reward_is_refused(tmp_path: Path, below: str) -> None
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda c: c.update(version=3), "expected format irl.reward 1 to 2, found 'irl.reward' 3"),
-        (lambda c: c.update(format="irl.policy"), "expected format irl.reward 1 to 2, found 'irl.policy'"),
+        (lambda c: c.update(version=4), "expected format irl.reward 1 to 3, found 'irl.reward' 4"),
+        (lambda c: c.update(format="irl.policy"), "expected format irl.reward 1 to 3, found 'irl.policy'"),
         (lambda c: c.update(reward_map="airy"), "unknown map 'airy'; known: gail"),
         (lambda c: c.update(extra=1), "spec.json: unknown extra; known: env_id"),
         (lambda c: c.pop("gamma"), "spec.json: missing gamma"),
@@ -174,7 +177,9 @@ def test_a_place_without_a_reward_is_refused(tmp_path: Path, below: str) -> None
         (lambda c: c["net"].pop("spectral_norm"), "spec.json.net: missing spectral_norm"),
         (lambda c: c["net"].update(hidden=[5, 5]), "size mismatch"),
         (lambda c: c["net"].update(obs_dim=4), "size mismatch"),
-        (lambda c: c.update(net=[3, 2]), "spec.json.net: expected the settings of LogitSpec"),
+        (lambda c: c.update(net=[3, 2]), "spec.json.net: kind is one of logit, shaped"),
+        (lambda c: c["net"].pop("kind"), "spec.json.net: kind is one of logit, shaped"),
+        (lambda c: c["net"].update(kind="shaped"), "spec.json.net: unknown spectral_norm"),
     ],
 )
 def test_a_specification_that_does_not_fit_is_refused(folder: Path, change, message: str) -> None:

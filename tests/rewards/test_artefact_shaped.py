@@ -1,0 +1,111 @@
+"""AIRL's reward as files: g by default, f when asked, and nothing else."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from irl.core.errors import UserError
+from irl.core.nets import fitted_normaliser
+from irl.core.rng import torch_stream
+from irl.core.types import Transitions
+from irl.rewards.artefact import WEIGHTS, RewardSpec, load_reward, save_reward
+from irl.rewards.shaped import ShapedNet, ShapedSpec
+from tests.rewards.test_artefact import REWARD, a_net, batch, edit, set_weights
+
+SHAPED = replace(
+    REWARD,
+    method="airl",
+    reward_map="g",
+    net=ShapedSpec(3, 2, (5, 4), (6,), "relu", "obs_action", 10.0),
+    gamma=0.9,
+)
+
+
+def shaped_net(spec: RewardSpec = SHAPED) -> ShapedNet:
+    assert isinstance(spec.net, ShapedSpec)
+    return ShapedNet(spec.net, fitted_normaliser(batch().obs), torch_stream(0, "net"))
+
+
+def steps() -> Transitions:
+    return replace(batch(), next_obs=batch().obs.roll(1, 0), terminated=torch.arange(20) % 7 == 6)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    save_reward(tmp_path / "reward", SHAPED, shaped_net())
+    return tmp_path / "reward"
+
+
+def test_g_f_and_h_come_back_to_the_bit(folder: Path) -> None:
+    g, f, net = load_reward(folder), load_reward(folder, "f"), shaped_net()
+    assert g.spec == SHAPED
+    assert f.spec == replace(SHAPED, reward_map="f")
+    going_on = replace(steps(), terminated=torch.zeros(20, dtype=torch.bool))
+    with torch.no_grad():
+        assert torch.equal(g(going_on), net.g(going_on))
+        assert torch.equal(f(going_on), net.f(going_on, 0.9))
+        assert torch.equal(f.logits(going_on), net.f(going_on, 0.9))
+        assert isinstance(f.net, ShapedNet)
+        assert torch.equal(f.net.h(going_on), net.h(going_on))
+        # at an end, with what s_abs pays
+        for reward, part in ((g, "g"), (f, "f")):
+            assert torch.equal(reward(steps()), net.paid(part, steps(), 0.9))
+    assert not torch.allclose(g(steps()), f(steps()))
+
+
+def test_a_state_only_reward_comes_back_to_the_bit(tmp_path: Path) -> None:
+    spec = replace(SHAPED, inputs="obs", net=ShapedSpec(3, 2, (), (4,), inputs="obs"))
+    save_reward(tmp_path, spec, net := shaped_net(spec))
+    with torch.no_grad():
+        assert torch.equal(load_reward(tmp_path)(steps()), net.g(steps()))
+
+
+@pytest.mark.parametrize("part", ["h", "logit", "", "f - log pi"])
+def test_a_part_that_there_is_not_is_refused(folder: Path, part: str) -> None:
+    with pytest.raises(UserError, match=r"airl in .* has no part .*; choose one of g, f") as caught:
+        load_reward(folder, part)
+    assert "\n" not in str(caught.value)
+
+
+def test_another_methods_reward_has_no_parts(tmp_path: Path) -> None:
+    save_reward(tmp_path, REWARD, a_net())
+    with pytest.raises(UserError, match="only AIRL's rewards have; leave it out"):
+        load_reward(tmp_path, "g")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c.update(reward_map="gail"), "unknown map 'gail'; known: g, f"),
+        (lambda c: c.update(version=2), "unknown inputs, potential_hidden"),
+        (lambda c: c["net"].update(inputs="all"), "spec.json.net.inputs: expected 'obs', 'obs_action'"),
+        (lambda c: c["net"].update(inputs="obs"), "size mismatch"),
+        (lambda c: c["net"].update(potential_hidden=[7]), "size mismatch"),
+        (lambda c: c["net"].update(potential_hidden=[500_000, 500_000]), "do not fit"),
+        (lambda c: c["net"].update(obs_dim=-2), "do not fit"),
+        (lambda c: c["net"].update(absorbing_scale=0.0), "size mismatch"),
+        (lambda c: c["net"].update(activation="gelu"), "gelu"),
+        (lambda c: c["net"].update(kind="logit"), "unknown inputs, potential_hidden"),
+        (lambda c: c["net"].pop("potential_hidden"), "missing potential_hidden"),
+    ],
+)
+def test_a_specification_that_does_not_fit_is_refused(folder: Path, change, message: str) -> None:
+    edit(folder, change)
+    with pytest.raises(UserError, match=message) as caught:
+        load_reward(folder)
+    assert "\n" not in str(caught.value)
+
+
+def test_weights_of_another_network_are_refused(folder: Path) -> None:
+    weights = load_file(folder / WEIGHTS)
+    for name in weights:
+        set_weights(folder, {other: weights[other] for other in weights if other != name})
+        with pytest.raises(UserError, match=r"Missing key|do not fit"):
+            load_reward(folder)
+    name = "potential.0.bias"
+    set_weights(folder, weights | {name: torch.full_like(weights[name], float("nan"))})
+    with pytest.raises(UserError, match=r"potential\.0\.bias has values that are not finite"):
+        load_reward(folder)
