@@ -44,6 +44,7 @@ DECLARED: dict[str, tuple[str, str]] = {
     "airl/log_pi_at_bound": ("share of those densities that the bound cut, mean over the round", "1"),
     "ppo/approx_kl": ("divergence of the old policy from the new one, mean over the last pass", "nats"),
     "ppo/clip_fraction": ("share of probability ratios beyond the clip range", "1"),
+    "ppo/policy_loss": ("minus the clipped surrogate, mean over the last pass", "advantage"),
     "ppo/value_loss": ("squared error of the value, scaled reward", "1"),
     "ppo/explained_variance": ("share of the return's variance that the value explains", "1"),
     "sac/actor_loss": ("the actor's loss at the round's last update", "scaled return"),
