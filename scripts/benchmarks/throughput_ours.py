@@ -17,13 +17,14 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.vec_env import DummyVecEnv
 from torch import nn
 
-from irl.algorithms.adversarial import ScheduleConfig
+from irl.algorithms.adversarial import ReplayedScheduleConfig, ScheduleConfig
 from irl.core.types import Episode
 from irl.demos.load import load_demos
+from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.gail import GAILConfig
 from irl.envs.tasks import task_name
 from irl.experiment import build
-from irl.experiment.configs import OFF_POLICY, DACRun, GAILRun, Imitation
+from irl.experiment.configs import OFF_POLICY, AIRLRun, DACRun, GAILRun, Imitation
 from irl.learners.ppo import PPOConfig
 
 SETTINGS = json.loads(Path(__file__).with_name("peer_settings.json").read_text())
@@ -31,29 +32,57 @@ ENVS = 8
 EPISODES = 4
 
 
-def peers(task: str) -> dict[str, Any]:
-    """The peer's tuned settings of GAIL on this task."""
-    return SETTINGS["gail"][task.split("-")[0]]
+def peers(method: str, task: str) -> dict[str, Any]:
+    """The peer's tuned settings of a method on this task."""
+    return SETTINGS[method][task.split("-")[0]]
+
+
+def ppo(s: dict[str, Any]) -> PPOConfig:
+    """PPO with those settings."""
+    its = dict(s["ppo"])
+    return PPOConfig(
+        n_envs=ENVS,
+        steps_per_round=s["round"],
+        lr=its.pop("learning_rate"),
+        lr_schedule="constant",
+        hidden=tuple(s["hidden"]),
+        activation=s["activation"],
+        **its,
+    )
+
+
+def schedule(s: dict[str, Any]) -> tuple[int, int]:
+    """Rows of a discriminator's update, and passes: as many updates as the peer's, at most a rollout each.
+
+    On Hopper that is more rows than the peer takes, on HalfCheetah GAIL half as many.
+    """
+    rows = min(max(s["demo_batch_size"], s["round"] // s["disc_updates"]), s["round"])
+    return rows, s["disc_updates"] * rows // s["round"]
 
 
 def gail(task: str) -> GAILRun:
-    """GAIL with PPO at those settings: as many updates of D a round, on at least as many steps on Hopper."""
-    s, ppo = peers(task), dict(peers(task)["ppo"])
-    batch = min(max(s["demo_batch_size"], s["round"] // s["disc_updates"]), s["round"])
+    """GAIL with PPO at those settings."""
+    s = peers("gail", task)
+    discriminator = GAILConfig(hidden=(32, 32), activation="relu", gradient_penalty=0.0)
     return GAILRun(
-        env_id=task,
-        learner=PPOConfig(
-            n_envs=ENVS,
-            steps_per_round=s["round"],
-            lr=ppo.pop("learning_rate"),
-            lr_schedule="constant",
-            hidden=tuple(s["hidden"]),
-            activation=s["activation"],
-            **ppo,
-        ),
-        discriminator=GAILConfig(hidden=(32, 32), activation="relu", gradient_penalty=0.0),
-        schedule=ScheduleConfig(batch, s["disc_updates"] * batch // s["round"]),
+        env_id=task, learner=ppo(s), discriminator=discriminator, schedule=ScheduleConfig(*schedule(s))
     )
+
+
+def airl(task: str) -> AIRLRun:
+    """AIRL with PPO at those settings; the peer's buffer of earlier steps is no longer than a round."""
+    s = peers("airl", task)
+    rows, passes = schedule(s)
+    discriminator = AIRLConfig(
+        hidden=(32,),
+        potential_hidden=(32, 32),
+        activation="relu",
+        gradient_penalty=0.0,
+        reward="f",
+        terminal="mask",
+    )
+    again = ReplayedScheduleConfig(rows, passes, warmup_rounds=0, negatives=1)
+    return AIRLRun(env_id=task, learner=ppo(s), discriminator=discriminator, schedule=again)
 
 
 def dac(task: str, products: str) -> DACRun:
@@ -108,7 +137,7 @@ def watch(algorithm: Any, shares: dict[str, float]) -> None:
 
 def sb3_ppo(task: str) -> Iterator[int]:
     """Stable-Baselines3's PPO on the task's own reward, at the peer's settings."""
-    s = peers(task)
+    s = peers("gail", task)
     venv = DummyVecEnv([lambda: gym.make(task) for _ in range(ENVS)])
     activation = {"relu": nn.ReLU, "tanh": nn.Tanh}[s["activation"]]
     shape = {"net_arch": s["hidden"], "activation_fn": activation}
@@ -148,6 +177,7 @@ def contender(name: str, task: str, root: Path, shares: dict[str, float] | None)
     """Its chunks, and how many of them warm it up."""
     made: dict[str, Callable[[], tuple[Iterator[int], int]]] = {
         "gail": lambda: (rounds(gail(task), root, shares), 1),
+        "airl": lambda: (rounds(airl(task), root, shares), 1),
         "dac": lambda: (rounds(dac(task, "bfloat16"), root, shares), 2),
         "dac-float32": lambda: (rounds(dac(task, "float32"), root, shares), 2),
         "sb3-ppo": lambda: (sb3_ppo(task), 1),

@@ -1,24 +1,20 @@
-"""The main peer's GAIL and AIRL (imitation 1.0.1) at its tuned settings, a round at a time; run by throughput.py.
+"""The main peer's GAIL and AIRL (imitation 1.0.1) at its tuned settings; run by throughput.py.
 
     PEER_PYTHON scripts/benchmarks/throughput_peer.py gail Hopper-v4 demonstrations.npz
 
 It needs an environment of its own: `python -m venv peer; peer/bin/pip install imitation==1.0.1 imageio
-'numpy<2' 'mujoco<3.2'`. It knows the -v4 tasks only; their dynamics are those of -v5.
+'numpy<2' 'pandas<2.3' 'mujoco<3.2'`. It knows the -v4 tasks only; their dynamics are those of -v5.
 """
 
+# pyright: reportMissingImports=false
+
 import json
-import os
 import sys
 import time
-import warnings
 from pathlib import Path
 
-import numpy as np
-
-warnings.filterwarnings("ignore")
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
 import gymnasium as gym
+import numpy as np
 import torch
 from imitation.algorithms.adversarial.airl import AIRL
 from imitation.algorithms.adversarial.gail import GAIL
@@ -85,7 +81,8 @@ def trainer(method, task, demonstrations):
 def main():
     """A round for each line read; prints its steps and seconds."""
     method, task, demonstrations = sys.argv[1:]
-    out, sys.stdout = sys.stdout, open(os.devnull, "w")
+    # its loggers print
+    out, sys.stdout = sys.stdout, sys.stderr
     made = trainer(method, task, demonstrations)
     print("ready", file=out, flush=True)
     for line in sys.stdin:

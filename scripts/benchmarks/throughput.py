@@ -1,0 +1,186 @@
+"""Environment steps a second, side by side: irl's methods, SB3 alone, the main peer.
+
+    python scripts/benchmarks/throughput.py --peer-python peer/bin/python
+
+Every contender is a process of its own with one thread, started and warmed up before anything is timed.
+Then they take turns, A B C A B C, so that whatever else the machine does hits all of them alike; while one
+runs the others wait. A contender's figure is the median of its turns. Where the time goes is taken in
+a further turn, under the same conditions, by a process that watches its own parts.
+
+Writes results/throughput.json.
+"""
+
+import contextlib
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+
+from irl.core.provenance import command_line, environment
+from irl.demos.load import load_demos
+from irl.envs.tasks import task_name
+
+HERE = Path(__file__).parent
+RESULTS = HERE / "results" / "throughput.json"
+OURS = ("gail", "airl", "sb3-ppo", "dac", "dac-float32", "sb3-sac")
+PEERS = ("gail", "airl")
+EPISODES = 4
+RATIOS = {
+    "gail_vs_imitation": ("gail", "imitation-gail"),
+    "airl_vs_imitation": ("airl", "imitation-airl"),
+    "gail_vs_sb3_ppo": ("gail", "sb3-ppo"),
+    "dac_vs_sb3_sac": ("dac", "sb3-sac"),
+    "dac_vs_sb3_sac_float32": ("dac-float32", "sb3-sac"),
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is timed, and for how long."""
+
+    peer_python: Path | None = None
+    """Python of the peer's own environment (see throughput_peer.py); without it the peer is left out."""
+    tasks: tuple[str, ...] = ("Hopper-v5", "HalfCheetah-v5")
+    """Gymnasium ids; the shelf must have an expert of each."""
+    turns: int = 5
+    """Turns of each contender."""
+    seconds: float = 6.0
+    """Least seconds of a turn; it ends with the round under way."""
+    out: Path = RESULTS
+    """The JSON to write."""
+
+
+class Contender:
+    """A process that trains when it is told to."""
+
+    def __init__(self, name: str, words: list[str]) -> None:
+        self.name = name
+        self._process = subprocess.Popen(
+            words,
+            text=True,
+            env={**os.environ, "OMP_NUM_THREADS": "1"},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+        if self._line() != "ready":
+            raise SystemExit(f"{name} did not start; try it by hand: {' '.join(words)}")
+
+    def turn(self, seconds: float) -> dict[str, Any]:
+        """Train for at least that long: steps, seconds and shares."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{seconds}\n")
+        self._process.stdin.flush()
+        return json.loads(self._line())
+
+    def _line(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline().strip()
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.wait()
+
+
+def demonstrations(task: str, root: Path) -> Path:
+    """The expert's episodes as a dataset in `root`, and as the arrays that the peer is given."""
+    program = "from irl.experiment.cli import main; main()"
+    words = ["demos", "generate", "--env-id", task, "--episodes", str(EPISODES), "--datasets-root", str(root)]
+    subprocess.run([sys.executable, "-c", program, *words], check=True, stdout=subprocess.DEVNULL)
+    episodes = list(load_demos(f"irl/{task_name(task)}/expert-v0", root=root))
+    arrays: dict[str, Any] = {"episodes": len(episodes)}
+    for i, e in enumerate(episodes):
+        arrays |= {f"obs{i}": e.obs, f"action{i}": e.action, f"reward{i}": e.reward}
+        arrays[f"terminal{i}"] = e.terminated
+    np.savez(path := root / f"{task}.npz", **arrays)
+    return path
+
+
+@contextlib.contextmanager
+def contenders(settings: Settings, task: str, root: Path) -> Iterator[list[Contender]]:
+    """Everybody, warmed up."""
+    made = []
+    try:
+        for name in OURS:
+            words = [sys.executable, str(HERE / "throughput_ours.py"), name, task, str(root)]
+            made.append(Contender(name, words))
+        for name in PEERS if settings.peer_python else ():
+            script, old = str(HERE / "throughput_peer.py"), task.replace("-v5", "-v4")
+            words = [str(settings.peer_python), "-W", "ignore", script, name, old, str(root / f"{task}.npz")]
+            made.append(Contender(f"imitation-{name}", words))
+        yield made
+    finally:
+        for contender in made:
+            contender.close()
+
+
+def timed(settings: Settings, task: str, root: Path) -> list[dict[str, Any]]:
+    """A row for each contender."""
+    speeds: dict[str, list[float]] = {}
+    with contenders(settings, task, root) as everybody:
+        for turn in range(settings.turns):
+            for contender in everybody:
+                done = contender.turn(settings.seconds)
+                speeds.setdefault(contender.name, []).append(done["steps"] / done["seconds"])
+                print(
+                    f"{task} turn {turn + 1} {contender.name:<15} {speeds[contender.name][-1]:8.1f} steps/s"
+                )
+    rows = []
+    for name, found in speeds.items():
+        row = {"name": name, "task": task, "steps_per_s": statistics.median(found), "turns": found}
+        rows.append(row | {"shares": shares(settings, name, task, root)})
+    return rows
+
+
+def shares(settings: Settings, name: str, task: str, root: Path) -> dict[str, float]:
+    """Which share of its time each part of one of ours takes."""
+    if name.startswith(("sb3", "imitation")):
+        return {}
+    script = str(HERE / "throughput_ours.py")
+    contender = Contender(name, [sys.executable, script, name, task, str(root), "--shares"])
+    try:
+        done = contender.turn(2 * settings.seconds)
+    finally:
+        contender.close()
+    of = {part: seconds / done["seconds"] for part, seconds in done["shares"].items()}
+    return of | {"rest": 1.0 - sum(of.values())}
+
+
+def ratios(rows: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
+    """The claims: one contender's speed over another's, by task."""
+    speed = {(row["name"], row["task"]): row["steps_per_s"] for row in rows}
+    tasks = sorted({row["task"] for row in rows}, reverse=True)
+    return {
+        claim: {
+            task: speed[a, task] / speed[b, task] for task in tasks if {(a, task), (b, task)} <= set(speed)
+        }
+        for claim, (a, b) in RATIOS.items()
+    }
+
+
+def main(settings: Settings) -> None:
+    """Time every task, print and write the results."""
+    rows: list[dict[str, Any]] = []
+    for task in settings.tasks:
+        with tempfile.TemporaryDirectory() as folder:
+            demonstrations(task, Path(folder))
+            rows += timed(settings, task, Path(folder))
+    facts = environment(f"python scripts/benchmarks/{command_line()}")
+    result = {"rows": rows, "ratios": ratios(rows), "commit": facts["git_commit"], **facts}
+    settings.out.parent.mkdir(exist_ok=True)
+    settings.out.write_text(json.dumps(result, indent=1) + "\n")
+    print(json.dumps(result["ratios"], indent=1))
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Settings))
