@@ -43,8 +43,8 @@ class TrainExpert:
     """Gymnasium id of the task."""
     resume: Path | None = None
     """Run folder to go on with, by its own settings; no other is needed."""
-    algo: Literal["ppo", "sac"] = "ppo"
-    """Which learner."""
+    algo: Literal["ppo", "sac"] | None = None
+    """Which learner; that of the shipped expert, or PPO for a task without one, unless given."""
     steps: int | None = None
     """Environment steps; the recipe's unless given."""
     seed: int = 0
@@ -141,14 +141,14 @@ def _resumed(command: TrainExpert) -> ExpertRun:
 
 
 def _expert_run(command: TrainExpert) -> ExpertRun:
-    chosen = recipe(command.env_id, command.algo)
+    algo, chosen = recipe(command.env_id, command.algo)
     task = task_name(command.env_id)
     return ExpertRun(
         env_id=command.env_id,
         level=command.level,
         steps=chosen.steps if command.steps is None else command.steps,
         seed=command.seed,
-        out=command.out or Path("runs") / f"{command.level}-{task}-{command.algo}-s{command.seed}",
+        out=command.out or Path("runs") / f"{command.level}-{task}-{algo}-s{command.seed}",
         learner=chosen.learner,
         watch=command.watch,
         device="cpu",

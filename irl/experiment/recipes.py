@@ -56,6 +56,8 @@ RECIPES: dict[tuple[str, str], Recipe] = {
 """By task and algorithm; a row here made a shipped expert."""
 
 
-def recipe(env_id: str, algo: str) -> Recipe:
-    """The row of this task, or the algorithm's default."""
-    return RECIPES.get((env_id, algo), DEFAULTS[algo])
+def recipe(env_id: str, algo: str | None) -> tuple[str, Recipe]:
+    """An algorithm and its row for this task, or its default; without one, that of the shipped expert."""
+    if algo is None:
+        algo = next((of for task, of in RECIPES if task == env_id), "ppo")
+    return algo, RECIPES.get((env_id, algo), DEFAULTS[algo])
