@@ -20,6 +20,7 @@ none); g and h of 100-100 tanh on observations normalised by the demonstrations'
 lead into s_abs, where the paper has none; the policy learns from f - log pi or f (the authors' code from g).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -29,7 +30,7 @@ from torch import Tensor
 
 from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
-from irl.core.types import Metrics, RewardFn, Transitions
+from irl.core.types import Metrics, Transitions
 from irl.discriminators import losses, regularisers
 from irl.discriminators.shaped_slopes import ShapedSlopes, Slopes, as_rows, from_rows, joined
 from irl.rewards.shaped import ShapedNet, ShapedSpec
@@ -89,7 +90,7 @@ class AIRL:
         action_dim: int,
         config: AIRLConfig,
         *,
-        log_pi: RewardFn,
+        log_pi: Callable[[Transitions], Tensor],
         gamma: float,
         normaliser: Normaliser,
         init_rng: torch.Generator,

@@ -129,8 +129,8 @@ class ShapedNet(nn.Module):
         of_g, now, after = self.reward(x.step), self.potential(x.now), self.potential(x.after)
         return shaped(of_g.squeeze(1), now.squeeze(1), after.squeeze(1), x.kept, gamma)
 
-    def of_absorbing(self) -> tuple[Float[Tensor, "1"], Float[Tensor, "1"]]:
-        """(g, h) of s_abs, where the action is 0.
+    def of_absorbing(self) -> Float[Tensor, "1"]:
+        """The g of s_abs, where the action is 0.
 
         Raises:
             ValueError: the networks know no s_abs.
@@ -138,9 +138,13 @@ class ShapedNet(nn.Module):
         if not self.spec.absorbing_scale:
             raise ValueError("these networks know no absorbing state")
         (seen, *_), _ = self.spec.sizes
-        x = self.normaliser.mean.new_zeros(1, seen)
+        return self.reward(self._flag(seen)).squeeze(1)
+
+    def _flag(self, width: int) -> Float[Tensor, "1 W"]:
+        """What says s_abs, and zeros."""
+        x = self.normaliser.mean.new_zeros(1, width)
         x[:, self.spec.obs_dim] = self.spec.absorbing_scale
-        return self.reward(x).squeeze(1), self.potential(x[:, : self.spec.state]).squeeze(1)
+        return x
 
     def paid(self, part: str, batch: Transitions, gamma: float) -> Float[Tensor, "B"]:
         """`part` of each step as a learner is paid it: at a termination with what s_abs pays.
@@ -153,9 +157,11 @@ class ShapedNet(nn.Module):
         of_steps = self.g(batch) if part == "g" else self.f(batch, gamma)
         if not self.spec.absorbing_scale or not bool(batch.terminated.any()):
             return of_steps
-        g, h = self.of_absorbing()
-        of_absorbing = g if part == "g" else shaped(g, h, h, torch.ones_like(h), gamma)
-        return tail.added(of_steps, of_absorbing, batch, gamma)
+        g = self.of_absorbing()
+        if part == "g":
+            return tail.added(of_steps, g, batch, gamma)
+        h = self.potential(self._flag(self.spec.state)).squeeze(1)
+        return tail.added(of_steps, shaped(g, h, h, torch.ones_like(h), gamma), batch, gamma)
 
 
 def shaped(

@@ -118,7 +118,9 @@ def test_ppos_log_pi_is_that_of_the_batchs_own_clipped_actions() -> None:
     torch.testing.assert_close(ours.log_pi(batch)[inside], by_sb3[inside], atol=1e-4, rtol=1e-4)
     # the others are masses: SB3's density of what was drawn is of something nobody saw
     with torch.no_grad():
-        mean = ours.model.policy.get_distribution(batch.obs).distribution.mean
+        normal = ours.model.policy.get_distribution(batch.obs).distribution
+    assert isinstance(normal, torch.distributions.Normal)
+    mean = normal.mean
     std = math.exp(0.5)
     row = int((~inside).nonzero()[0])
     by_hand = 0.0

@@ -19,12 +19,13 @@ from irl.rewards.artefact import SPEC, WEIGHTS, RewardSpec, load_reward, save_re
 from irl.rewards.maps import MAPS, gail
 from irl.rewards.nets import LogitNet, LogitSpec
 
+SHAPE = LogitSpec(3, 2, (5, 4))
 REWARD = RewardSpec(
     env_id="Hopper-v5",
     method="gail",
     reward_map="gail",
     inputs="obs, action",
-    net=LogitSpec(3, 2, (5, 4)),
+    net=SHAPE,
     gamma=0.99,
     reward_scale=2.5,
     env_steps=2048,
@@ -40,7 +41,7 @@ def batch(n: int = 20, obs_dim: int = 3, action_dim: int = 2) -> Transitions:
     return Transitions(obs, action, obs, flags, flags)
 
 
-def a_net(seed: int = 0, spec: LogitSpec = REWARD.net) -> LogitNet:
+def a_net(seed: int = 0, spec: LogitSpec = SHAPE) -> LogitNet:
     return LogitNet(spec, fitted_normaliser(batch().obs), torch_stream(seed, "net"))
 
 
@@ -65,8 +66,8 @@ def set_weights(folder: Path, weights: dict[str, torch.Tensor]) -> None:
 @pytest.mark.parametrize("hidden", [(), (6,), (5, 4)])
 @pytest.mark.parametrize("activation", ["tanh", "relu"])
 def test_a_loaded_reward_gives_the_same_rewards_to_the_bit(tmp_path: Path, hidden, activation) -> None:
-    spec = replace(REWARD, net=LogitSpec(3, 2, hidden, activation))
-    net = a_net(spec=spec.net)
+    shape = LogitSpec(3, 2, hidden, activation)
+    spec, net = replace(REWARD, net=shape), a_net(spec=shape)
     save_reward(tmp_path, spec, net)
     reward = load_reward(tmp_path)
     assert reward.spec == spec
