@@ -5,13 +5,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from rich.table import Table
+from rich.text import Text
 
 from irl.demos.storage import open_dataset, read_episodes
 
 
 @dataclass(frozen=True)
 class DemosInfo:
-    """One dataset. Returns are undiscounted, their standard deviation is over episodes."""
+    """One dataset. Returns are undiscounted, their standard deviation is over episodes.
+
+    They are NaN where rewards were not recorded.
+    """
 
     dataset_id: str
     env_id: str | None
@@ -28,6 +33,8 @@ class DemosInfo:
     """Other numbers that every step has, by `info` key."""
     seeds: tuple[int | None, ...]
     """What the environment was reset with, an episode."""
+    action_size: int
+    """Numbers of an action; 0 where no actions were recorded."""
     size_bytes: int
     algorithm: str | None
     author: str | None
@@ -58,6 +65,7 @@ def show(dataset_id: str, root: Path | str | None = None) -> DemosInfo:
         terms=_shared([e.terms for e in episodes]),
         infos=_shared([e.infos for e in episodes]),
         seeds=tuple(e.seed for e in episodes),
+        action_size=episodes[0].action.shape[1],
         size_bytes=sum(file.stat().st_size for file in dataset.path.rglob("*") if file.is_file()),
         algorithm=dataset.algorithm,
         author=dataset.author,
@@ -69,3 +77,29 @@ def show(dataset_id: str, root: Path | str | None = None) -> DemosInfo:
 
 def _shared(columns: Sequence[Mapping[str, object]]) -> tuple[str, ...]:
     return tuple(key for key in columns[0] if all(key in others for others in columns))
+
+
+def table(info: DemosInfo) -> Table:
+    """The dataset for a person to read."""
+    found = Table(show_header=False, title=info.dataset_id)
+    paid = f"{info.return_mean:.1f} ± {info.return_std:.1f}"
+    rows = {
+        "task": info.env_id or "unknown",
+        "episodes": f"{info.episodes} of {info.length_min} to {info.length_max} steps, {info.steps:,} in all",
+        "return": "not recorded" if np.isnan(info.return_mean) else paid,
+        "reference returns": f"random {_number(info.random_return)}, expert {_number(info.expert_return)}",
+        "actions": f"{info.action_size} numbers" if info.action_size else "none recorded",
+        "reward terms": ", ".join(info.terms) or "none recorded",
+        "also recorded": ", ".join(info.infos) or "nothing",
+        "made by": info.algorithm or "unknown",
+        "size": f"{info.size_bytes / 1e6:.1f} MB",
+        "folder": str(info.path),
+    }
+    for name, value in rows.items():
+        # what a file says is neither markup, nor for the terminal to obey
+        found.add_row(name, Text("".join(c if c.isprintable() else "?" for c in value)))
+    return found
+
+
+def _number(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.1f}"

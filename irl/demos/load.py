@@ -6,17 +6,14 @@ from pathlib import Path
 from typing import overload
 
 import gymnasium as gym
-import numpy as np
 from gymnasium.spaces import Box
 
 from irl.core.errors import UserError
 from irl.core.rng import stream
 from irl.core.types import Episode
+from irl.demos.bounds import first_outside
 from irl.demos.storage import open_dataset, read_episodes
 from irl.envs.tasks import task_of
-
-FLOAT32_UNITS = 8
-"""How far beyond a bound an action may lie, in float32's units of the bound's last place."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,7 +52,12 @@ class Demos(Sequence[Episode]):
 
 
 def load_demos(
-    dataset_id: str, *, episodes: int | None = None, seed: int = 0, root: Path | str | None = None
+    dataset_id: str,
+    *,
+    episodes: int | None = None,
+    seed: int = 0,
+    root: Path | str | None = None,
+    obs_keys: Sequence[str] = (),
 ) -> Demos:
     """Demonstrations of a dataset: `episodes` of them drawn with `seed`, the rest held out.
 
@@ -65,11 +67,12 @@ def load_demos(
         episodes: how many to train on; None takes all and holds none out.
         seed: of the draw, from its stream "demos".
         root: folder of the datasets; see `irl.demos.root.datasets_root` for what else is looked at.
+        obs_keys: parts of observations in a dictionary that are put in a row, in this order.
 
     Raises:
         UserError: the dataset is not there or cannot be read, or has fewer episodes.
     """
-    dataset = open_dataset(dataset_id, root)
+    dataset = open_dataset(dataset_id, root, tuple(obs_keys))
     n = dataset.episodes if episodes is None else episodes
     if n < 1 or n > dataset.episodes:
         raise UserError(
@@ -120,16 +123,13 @@ def check_task(demos: Demos, env: gym.Env) -> None:
 
 def _check_actions(demos: Demos, wanted: str, space: gym.Space) -> None:
     assert isinstance(space, Box)
-    low, high = space.low.astype(np.float64), space.high.astype(np.float64)
-    # a bound as float32 is off by half a unit in the last place, an action scaled to it by a few
-    slack = FLOAT32_UNITS * np.finfo(np.float32).eps * np.maximum(np.abs(low), np.abs(high))
     indices = (*demos.indices, *demos.held_out_indices)
     for index, episode in zip(indices, (*demos.episodes, *demos.held_out), strict=True):
-        outside = (episode.action < low - slack) | (episode.action > high + slack)
-        if outside.any():
-            step, column = (int(i) for i in np.argwhere(outside)[0])
+        if (place := first_outside(episode.action, space)) is not None:
+            step, column = place
             raise UserError(
                 f"demonstrations {demos.dataset_id}: episode {index} has the action "
-                f"{float(episode.action[step, column])!r} in column {column} at step {step}; {wanted} takes "
-                f"{low[column]:g} to {high[column]:g}; record actions as the environment gets them, clipped"
+                f"{float(episode.action[place])!r} in column {column} at step {step}; {wanted} takes "
+                f"{space.low[column]:g} to {space.high[column]:g}; record actions as the environment gets "
+                f"them, clipped"
             )

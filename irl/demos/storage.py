@@ -4,54 +4,20 @@ The files are read here and not by Minari, which would run what a dataset names:
 makes the environment of the dataset's own `env_spec`, whose entry point may be any function there is.
 """
 
-import json
 import shlex
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import minari
-from gymnasium.envs.registration import parse_env_id
 from gymnasium.error import Error
-from gymnasium.spaces import Box
 from minari.dataset.minari_dataset import parse_dataset_id
-from minari.serialization import deserialize_space
 
 from irl.core import files
-from irl.core.config import from_json
 from irl.core.errors import UserError
 from irl.core.types import Episode
-from irl.demos.episodes import DATA, read
+from irl.demos import arrow, hdf5
+from irl.demos.hdf5 import DATA
+from irl.demos.metadata import DIGEST, LONGEST_ID, METADATA, Dataset, parse
 from irl.demos.root import datasets_root
-from irl.envs.make import check_flat
-from irl.envs.tasks import TASKS, task_of
-
-METADATA = "metadata.json"
-DIGEST = "irl_data_sha256"
-"""Key of the metadata with the SHA-256 of the data: damaged HDF5 can take the whole process down."""
-LONGEST_ID = 200
-
-
-@dataclass(frozen=True)
-class Dataset:
-    """What the metadata of a dataset say."""
-
-    dataset_id: str
-    path: Path
-    """Its folder; the files are in `path / "data"`."""
-    obs_space: Box
-    action_space: Box
-    episodes: int
-    env_id: str | None
-    algorithm: str | None
-    author: str | None
-    description: str | None
-    random_return: float | None
-    """Mean return of random actions, the zero of a normalised score."""
-    expert_return: float | None
-    """Mean return of the expert, the one of a normalised score."""
-    digest: str | None
+from irl.envs.tasks import TASKS
 
 
 def list_datasets(root: Path | str | None = None) -> list[str]:
@@ -90,8 +56,11 @@ def generate_command(dataset_id: str, root: Path | str | None = None) -> str:
     return f"irl demos generate --env-id {env_id} --dataset-id {dataset_id}{where}"
 
 
-def open_dataset(dataset_id: str, root: Path | str | None = None) -> Dataset:
+def open_dataset(dataset_id: str, root: Path | str | None = None, obs_keys: tuple[str, ...] = ()) -> Dataset:
     """The dataset of that id; reads its metadata and checks the digest of its data.
+
+    Args:
+        obs_keys: parts of observations in a dictionary that are put in a row, in this order.
 
     Raises:
         UserError: not a dataset id; not there (says what is, and how to make it); not readable; of
@@ -107,7 +76,7 @@ def open_dataset(dataset_id: str, root: Path | str | None = None) -> Dataset:
             f"`{generate_command(dataset_id, root)}`"
         )
     try:
-        dataset = _dataset(dataset_id, path, files.read_json(path / "data" / METADATA))
+        dataset = parse(dataset_id, path, files.read_json(path / "data" / METADATA), obs_keys)
         _check_digest(dataset)
     # what Minari and Gymnasium raise over a space or an id that is none
     except (ValueError, LookupError, TypeError, AttributeError, AssertionError, OSError, Error) as error:
@@ -121,68 +90,21 @@ def read_episodes(dataset: Dataset, root: Path | str | None = None) -> list[Epis
     """Every episode of the dataset, in its order; `irl.demos.episodes` says how.
 
     Raises:
-        UserError: the data are damaged, or cannot have happened.
+        UserError: the data are damaged, or cannot have happened; or pyarrow is needed and not there.
     """
-    task = task_of(dataset.env_id) if dataset.env_id is not None else None
-    sizes = dataset.obs_space.shape[0], dataset.action_space.shape[0]
+    data = dataset.path / "data"
     try:
-        return read(dataset.path / "data" / DATA, dataset.episodes, sizes, task)
+        if dataset.form in arrow.FORMATS:
+            arrow.pyarrow()
+    except UserError as error:
+        raise UserError(f"dataset {dataset.dataset_id} in {dataset.path}: {error}") from error
+    try:
+        if dataset.form in arrow.FORMATS:
+            return arrow.read(data, dataset.form, dataset.episodes, dataset.layout)
+        return hdf5.read(data / DATA, dataset.episodes, dataset.layout)
     # what h5py says of damage, by where it is
     except (ValueError, LookupError, TypeError, OSError, RuntimeError, SystemError, MemoryError) as error:
         raise _unreadable(dataset.dataset_id, dataset.path, error, root) from error
-
-
-def _dataset(dataset_id: str, path: Path, content: Any) -> Dataset:
-    metadata = from_json(dict[str, Any], content, METADATA)
-
-    def optional(kind: Any, key: str) -> Any:
-        return from_json(kind | None, metadata.get(key), f"{METADATA}.{key}")
-
-    version, form = metadata.get("minari_version"), metadata.get("data_format")
-    if version not in minari.supported_dataset_versions:
-        raise ValueError(f"minari_version {version!r:.40}; Minari {minari.__version__} does not know it")
-    if form != "hdf5":
-        raise ValueError(f"data_format {form!r:.40}; expected 'hdf5'")
-    return Dataset(
-        dataset_id=dataset_id,
-        path=path,
-        obs_space=_space(metadata, "observation"),
-        action_space=_space(metadata, "action"),
-        episodes=from_json(int, metadata.get("total_episodes"), f"{METADATA}.total_episodes"),
-        env_id=_env_id(optional(str, "env_spec")),
-        algorithm=optional(str, "algorithm_name"),
-        author=_author(metadata.get("author")),
-        description=optional(str, "description"),
-        random_return=optional(float, "ref_min_score"),
-        expert_return=optional(float, "ref_max_score"),
-        digest=optional(str, DIGEST),
-    )
-
-
-def _author(content: Any) -> str | None:
-    """One name or several: older datasets have a string."""
-    names = [content] if isinstance(content, str) else content or []
-    return ", ".join(sorted(from_json(tuple[str, ...], names, f"{METADATA}.author"))) or None
-
-
-def _space(metadata: Mapping[str, Any], of: str) -> Any:
-    if (key := f"{of}_space") not in metadata:
-        raise ValueError(f"{METADATA} names no {key}, and irl makes no environment that a file names")
-    space = deserialize_space(from_json(str, metadata[key], f"{METADATA}.{key}"))
-    check_flat("it", f"{of}s", space)
-    return space
-
-
-def _env_id(spec: str | None) -> str | None:
-    """The id that a dataset's `env_spec` names; nothing else of it is looked at."""
-    if spec is None:
-        return None
-    env_id = from_json(str, from_json(dict[str, Any], json.loads(spec), "env_spec").get("id"), "env_spec.id")
-    if ":" in env_id or len(env_id) > LONGEST_ID:
-        # gymnasium would import what stands before the colon; the id it records never has one
-        raise ValueError(f"env_spec names the environment {env_id!r:.80}; expected an id without a module")
-    parse_env_id(env_id)
-    return env_id
 
 
 def _check_digest(dataset: Dataset) -> None:

@@ -1,6 +1,7 @@
 """An environment by its id; what cannot be used is refused with one line that says what to type instead."""
 
 import difflib
+import json
 import os
 import re
 import sys
@@ -13,32 +14,58 @@ import gymnasium as gym
 import mujoco
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Dict, Discrete
 
 from irl.core.errors import UserError
+from irl.envs.discrete import OneHotActions
+from irl.envs.flatten import OBS_KEYS, FlatKeys
 from irl.envs.guard import Guarded
+from irl.envs.names import split_name
 
 VARIABLE = "IRL_ENV_MODULES"
 """Environment variable that names the modules which a file may have imported."""
 
 _FLAT = {
     "observations": "e.g. of shape (11,); gymnasium.wrappers.FlattenObservation makes one of many spaces",
-    "actions": "e.g. of shape (3,)",
+    "actions": "e.g. of shape (3,), or a Discrete choice",
 }
 
-LIST_HINT = "; `python -c 'import gymnasium; gymnasium.pprint_registry()'` lists those there are"
+LIST_HINT = (
+    "; `python -c 'import gymnasium; gymnasium.pprint_registry()'` lists those there are; --import MODULE "
+    "imports the module that registers yours"
+)
 
 
 def make(env_id: str, **kwargs: Any) -> gym.Env:
     """The Gymnasium environment called `env_id`, with a flat observation and a bounded flat action.
 
+    A choice of actions becomes a row for each (`irl.envs.discrete`), observations in a dictionary the row
+    of those parts that `obs_keys` names.
+
     Args:
-        env_id: name and version, e.g. `Hopper-v5`; `module:Name-v0` imports `module` first.
-        kwargs: given on to the environment.
+        env_id: full name (`irl.envs.names`), e.g. `Hopper-v5`; `module:Name-v0` imports `module` first.
+        kwargs: given on to the environment, with those in the name.
 
     Raises:
         UserError: no such environment, it cannot be built here, or its spaces cannot be used.
     """
+    env_id, named = split_name(env_id)
+    kwargs = named | kwargs
+    keys = kwargs.pop(OBS_KEYS, None)
+    env = _made(env_id, kwargs)
+    try:
+        if keys is not None:
+            env = FlatKeys(env, env_id, [keys] if isinstance(keys, str) else keys)
+        if isinstance(env.action_space, Discrete):
+            env = OneHotActions(env)
+        _check_spaces(env_id, env)
+    except UserError:
+        env.close()
+        raise
+    return Guarded(env, env_id)
+
+
+def _made(env_id: str, kwargs: dict[str, Any]) -> gym.Env:
     with warnings.catch_warnings(), _quiet_compiler():
         # "out of date", "did you mean": said in our own words where it is a mistake
         warnings.filterwarnings("ignore", message=r"(\x1b\[\d+m)?WARN: ")
@@ -46,7 +73,7 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
             # an id without a version would be recorded under a name that is not the environment's
             if env_id not in gym.registry and ":" not in env_id:
                 raise UserError(f"there is no environment {env_id!r}{_near(env_id) or LIST_HINT}")
-            env = gym.make(env_id, **kwargs)
+            return gym.make(env_id, **kwargs)
         except UserError:
             raise
         # whatever the environment's own code raises, it cannot be made
@@ -56,12 +83,6 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
             )
             said = ": ".join(filter(None, (what, _one_line(error))))
             raise UserError(f"cannot make {env_id!r}: {said}{_near(env_id)}") from error
-    try:
-        _check_spaces(env_id, env)
-    except UserError:
-        env.close()
-        raise
-    return Guarded(env, env_id)
 
 
 def check_module(env_id: str, where: str) -> None:
@@ -73,7 +94,7 @@ def check_module(env_id: str, where: str) -> None:
     Raises:
         UserError: says how to allow it.
     """
-    module, colon, _ = env_id.rpartition(":")
+    module, colon, _ = env_id.partition("?")[0].rpartition(":")
     allowed = os.environ.get(VARIABLE, "").split(",")
     if colon and module not in allowed and module not in sys.modules:
         raise UserError(
@@ -128,6 +149,12 @@ def _one_line(error: BaseException) -> str:
 
 def _check_spaces(env_id: str, env: gym.Env) -> None:
     obs, action = env.observation_space, env.action_space
+    if isinstance(obs, Dict):
+        raise UserError(
+            f"{env_id} has the observations {' '.join(str(obs).split()):.120}; expected a flat Box of real "
+            f"numbers: name the parts to be put in a row, --env-kwargs "
+            f"'{{\"{OBS_KEYS}\": {json.dumps(list(obs.spaces))}}}'"
+        )
     check_flat(env_id, "observations", obs)
     check_flat(env_id, "actions", action)
     if not (isinstance(action, Box) and action.is_bounded()):

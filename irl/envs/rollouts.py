@@ -10,6 +10,7 @@ from gymnasium.spaces import Box
 from jaxtyping import Float
 
 from irl.core.types import ActFn, Episode
+from irl.envs.discrete import OneHot
 from irl.envs.make import make
 from irl.envs.tasks import task_of
 
@@ -40,6 +41,8 @@ def record(env: gym.Env, act: ActFn, seed: int) -> tuple[Episode, dict[str, floa
     terminated = truncated = False
     while not (terminated or truncated):
         wanted = np.asarray(act(obs[-1]), dtype=dtype)
+        if isinstance(space, OneHot):
+            wanted = space.row(wanted)
         if wanted.shape != low.shape:
             raise ValueError(f"expected actions of shape {low.shape}, the policy gave {wanted.shape}")
         action = np.minimum(np.maximum(wanted, low), high)
@@ -90,13 +93,15 @@ def rollouts(
 
 
 def random_act(action_space: gym.Space, rng: np.random.Generator) -> ActFn:
-    """The policy that draws every action uniformly within the bounds, from `rng`.
+    """The policy that draws every action uniformly within the bounds, or of the choices, from `rng`.
 
     Raises:
         ValueError: the action space is not a bounded Box.
     """
     if not isinstance(action_space, Box) or not action_space.is_bounded():
         raise ValueError(f"expected a bounded Box of actions, got {action_space}")
+    if isinstance(space := action_space, OneHot):
+        return lambda obs: space.rows(rng.integers(space.choices.n, size=1) + int(space.choices.start))[0]
     low, high = action_space.low.astype(np.float64), action_space.high.astype(np.float64)
 
     def act(obs: Float[np.ndarray, "O"]) -> Float[np.ndarray, "A"]:

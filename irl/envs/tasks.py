@@ -5,6 +5,7 @@ The keys were read off gymnasium 1.4.0; a test holds each row against the live e
 """
 
 import re
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -102,18 +103,23 @@ TASKS: tuple[Task, ...] = (
 
 
 def task_of(env_id: str) -> Task | None:
-    """The row of `env_id`, version included, or None for a task that is not in the table."""
-    return next((task for task in TASKS if task.env_id == env_id), None)
+    """The row of `env_id`, version included, or None for a task that is not in the table.
+
+    What the environment is given (`irl.envs.names`) does not matter: the terms are the same.
+    """
+    return next((task for task in TASKS if task.env_id == env_id.partition("?")[0]), None)
 
 
 def task_name(env_id: str) -> str:
     """The short name of an environment: `hopper` for `Hopper-v5`, `pendulum` for `Pendulum-v1`.
 
     An id that is not in the table loses its version; what a folder name or a dataset id cannot hold
-    becomes a dash.
+    becomes a dash. What the environment is given becomes eight digits: a variant is a task of its own.
     """
-    task = task_of(env_id)
+    bare, mark, given = env_id.partition("?")
+    variant = f"-{zlib.crc32(given.encode()):08x}" if mark else ""
+    task = task_of(bare)
     if task is not None:
-        return task.name
-    without_version = re.sub(r"-v\d+$", "", env_id.lower())
-    return re.sub(r"[^a-z0-9_]+", "-", without_version).strip("-")
+        return task.name + variant
+    without_version = re.sub(r"-v\d+$", "", bare.lower())
+    return re.sub(r"[^a-z0-9_]+", "-", without_version).strip("-") + variant

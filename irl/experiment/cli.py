@@ -11,14 +11,18 @@ import tyro
 from rich.console import Console
 
 from irl.core.errors import UserError
-from irl.experiment import demonstrations, evaluate, experts, export, retrain, train
+from irl.experiment import demonstrations, evaluate, experts, export, imports, retrain, train
 from irl.experiment.configs import AIRLRun, AIRLSACRun, DACRun, GAILRun, GAILSACRun
+from irl.experiment.modules import import_named
 from irl.experiment.play import Interrupted
 
 Run = Callable[[Any], None]
 
 COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("demos", "generate"): (demonstrations.GenerateDemos, demonstrations.generate_demos),
+    ("demos", "import"): (imports.ImportDemos, imports.import_demos),
+    ("demos", "merge"): (imports.MergeDemos, imports.merge_demos),
+    ("demos", "split"): (imports.SplitDemos, imports.split_demos),
     ("demos", "show"): (demonstrations.ShowDemos, demonstrations.show_demos),
     ("demos", "list"): (demonstrations.ListDemos, demonstrations.list_demos),
     ("train", "gail"): (GAILRun, train.train),
@@ -49,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     debug = "--debug" in words
     words = [word for word in words if word != "--debug"]
     try:
-        _dispatch(words)
+        _dispatch(import_named(words))
     except (UserError, OSError) as error:
         if debug:
             raise

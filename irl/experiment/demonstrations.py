@@ -5,14 +5,12 @@ from pathlib import Path
 
 import tyro
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from irl.core.config import check_at_least, check_seed
 from irl.core.errors import UserError
 from irl.core.rng import episode_seeds
 from irl.demos.generate import generate
-from irl.demos.info import DemosInfo, show
+from irl.demos.info import show, table
 from irl.demos.root import datasets_root
 from irl.demos.storage import list_datasets
 from irl.envs.make import make
@@ -92,7 +90,7 @@ def generate_demos(command: GenerateDemos) -> None:
             on_episode=each_episode(report),
             overwrite=command.overwrite,
         )
-    Console().print(_table(info))
+    Console().print(table(info))
 
 
 def _reference(command: GenerateDemos, card: Card) -> float:
@@ -103,7 +101,7 @@ def _reference(command: GenerateDemos, card: Card) -> float:
 
 def show_demos(command: ShowDemos) -> None:
     """Print what a dataset holds."""
-    Console().print(_table(show(command.dataset_id, command.datasets_root)))
+    Console().print(table(show(command.dataset_id, command.datasets_root)))
 
 
 def list_demos(command: ListDemos) -> None:
@@ -114,26 +112,3 @@ def list_demos(command: ListDemos) -> None:
         raise UserError(f"no datasets in {where}; make one with: irl demos generate --env-id Hopper-v5")
     for name in names:
         print(name)
-
-
-def _table(info: DemosInfo) -> Table:
-    table = Table(show_header=False, title=info.dataset_id)
-    rows = {
-        "task": info.env_id or "unknown",
-        "episodes": f"{info.episodes} of {info.length_min} to {info.length_max} steps, {info.steps:,} in all",
-        "return": f"{info.return_mean:.1f} ± {info.return_std:.1f}",
-        "reference returns": f"random {_number(info.random_return)}, expert {_number(info.expert_return)}",
-        "reward terms": ", ".join(info.terms) or "none recorded",
-        "also recorded": ", ".join(info.infos) or "nothing",
-        "made by": info.algorithm or "unknown",
-        "size": f"{info.size_bytes / 1e6:.1f} MB",
-        "folder": str(info.path),
-    }
-    for name, value in rows.items():
-        # what a file says is neither markup, nor for the terminal to obey
-        table.add_row(name, Text("".join(c if c.isprintable() else "?" for c in value)))
-    return table
-
-
-def _number(value: float | None) -> str:
-    return "unknown" if value is None else f"{value:.1f}"

@@ -10,7 +10,7 @@ import pytest
 from irl.core.rng import stream
 from irl.demos.generate import generate
 from irl.demos.info import DemosInfo
-from irl.demos.storage import DIGEST
+from irl.demos.metadata import DIGEST
 from irl.envs.make import make
 from irl.envs.rollouts import random_act
 

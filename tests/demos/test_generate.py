@@ -11,7 +11,7 @@ from minari.namespace import list_local_namespaces
 
 from irl.core.errors import UserError
 from irl.core.types import ActFn
-from irl.demos import generate as module
+from irl.demos import write as module
 from irl.demos.generate import generate
 from irl.demos.info import show
 from irl.envs.make import make

@@ -67,7 +67,8 @@ ENVIRONMENTS = {
         ("image observations", ("(8, 8, 3)", "uint8", "flat Box"), (TRAIN,)),
         ("byte observations", ("uint8", "flat Box"), (TRAIN,)),
         ("discrete observations", ("Discrete(4)", "flat Box"), (TRAIN,)),
-        ("discrete actions", ("Discrete(4)", "flat Box"), (TRAIN,)),
+        ("discrete actions", ("actions of 2", "2 and 4"), (TRAIN,)),
+        ("several choices", ("MultiDiscrete", "flat Box"), (TRAIN,)),
         ("dict actions", ("Dict", "flat Box"), (TRAIN,)),
         ("unbounded actions", ("finite bounds",), (TRAIN,)),
     )

@@ -11,7 +11,7 @@ from safetensors import safe_open
 from safetensors.numpy import save
 
 from irl.core import files
-from irl.demos.storage import DIGEST
+from irl.demos.metadata import DIGEST
 
 Damage = Callable[[Path], None]
 

@@ -105,7 +105,7 @@ FILES = {
     "metadata nested too deeply": metadata(being("[" * 100_000), "nested too deeply"),
     "metadata that name a key twice": metadata(being('{"a": 1, "a": 2}'), "twice", "a"),
     "a version of Minari to come": metadata(keyed(minari_version="9.9.9"), "minari_version", "9.9.9"),
-    "another format": metadata(keyed(data_format="arrow"), "arrow", "hdf5"),
+    "another format": metadata(keyed(data_format="zarr"), "zarr", "hdf5", "arrow"),
     "no observation space": metadata(no_space, "observation_space"),
     "a space that is no JSON": metadata(keyed(action_space="Box"), "cannot be read"),
     "a space of no known type": data(space("action", type="Graph"), *AGAIN),
@@ -133,7 +133,11 @@ FILES = {
         space("observation", type="Discrete", n=4, start=0), "Discrete(4)"
     ),
     "actions that are discrete": data(
-        space("action", type="Discrete", n=4, start=0), "Discrete(4)", "flat Box"
+        space("action", type="Discrete", n=4, start=0), "episode 0", "actions of float", "whole numbers"
+    ),
+    "several choices": data(
+        space("action", type="MultiDiscrete", dtype="int64", nvec=[2, 3], start=[0, 0]),
+        *("MultiDiscrete", "flat Box"),
     ),
 }
 

@@ -74,6 +74,7 @@ FAULTY: dict[str, Callable[[], gym.Env]] = {
     "byte observations": _with(observation_space=spaces.Box(0, 255, (128,), np.uint8)),
     "discrete observations": _with(observation_space=spaces.Discrete(4)),
     "discrete actions": _with(action_space=spaces.Discrete(4)),
+    "several choices": _with(action_space=spaces.MultiDiscrete([2, 3])),
     "dict actions": _with(action_space=spaces.Dict({"x": _BOX})),
     "unbounded actions": _with(action_space=spaces.Box(-np.inf, np.inf, (2,))),
 }

@@ -7,7 +7,7 @@ import gymnasium as gym
 import pytest
 
 from tests.experiment.conftest import TASK
-from tests.malformed import commands, datasets, environments, runs
+from tests.malformed import commands, datasets, environments, imports, runs
 from tests.malformed.conftest import refused, tree
 from tests.malformed.table import Case
 
@@ -20,6 +20,8 @@ PARTS = (
     commands.ENVIRONMENTS,
     commands.REUSED,
     commands.PLACES,
+    imports.FILES,
+    imports.CURATED,
 )
 TABLE: dict[str, Case] = {name: case for part in PARTS for name, case in part.items()}
 
