@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Sequence
 
+import gymnasium as gym
 import torch
 
 from irl.algorithms.adversarial import Adversarial
@@ -16,6 +17,7 @@ from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.discriminators.dac import DAC, DACConfig
 from irl.discriminators.gail import GAIL
 from irl.envs.absorbing import subsample
+from irl.envs.discrete import OneHot
 from irl.experiment.configs import (
     AIRLRun,
     AIRLSACRun,
@@ -45,6 +47,20 @@ def absorbing_scale(config: Imitation) -> float:
     """Distance of the absorbing state that the discriminator knows; 0 where it knows none."""
     of = config.discriminator
     return of.scale if isinstance(of, AIRLConfig) else of.absorbing_scale
+
+
+def check_learner(kind: str, env: gym.Env) -> None:
+    """Refuse a learner for a task whose actions it cannot take.
+
+    Raises:
+        UserError: it is SAC, and the task has a choice of actions.
+    """
+    if kind == SACConfig.KIND and isinstance(env.action_space, OneHot):
+        wanted = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
+        raise UserError(
+            f"SAC takes actions that are real numbers, {wanted} has a choice of {env.action_space.shape[0]}; "
+            f"learn with PPO: irl train gail, or --algo ppo"
+        )
 
 
 def demonstrations(config: Imitation, episodes: Sequence[Episode]) -> Transitions:

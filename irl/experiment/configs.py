@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar, Literal, TypeVar
+from typing import Annotated, ClassVar, Literal, TypeVar
+
+import tyro
 
 from irl.algorithms.adversarial import ReplayedScheduleConfig, ScheduleConfig
 from irl.algorithms.interleaved import InterleavedConfig
@@ -10,11 +12,13 @@ from irl.core.config import check_at_least, check_seed, check_threads
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
+from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 
 Run = TypeVar("Run", bound="ImitationRun")
+Words = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE ...")]
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,8 @@ class ImitationRun:
     KIND: ClassVar[str] = ""
     env_id: str
     """Gymnasium id of the task, e.g. Hopper-v5."""
+    env_kwargs: Words = ()
+    """What the environment is given, name=value or a JSON object; becomes part of env_id."""
     demos: str = ""
     """Minari dataset of demonstrations; irl/<task>/expert-v0 unless given."""
     demo_episodes: int = 4
@@ -71,9 +77,12 @@ class ImitationRun:
 
     def resolved(self: Run) -> Run:
         """The same with every default that depends on another setting filled in."""
-        task = task_name(self.env_id)
+        env_id = full_name(self.env_id, self.env_kwargs)
+        task = task_name(env_id)
         return replace(
             self,
+            env_id=env_id,
+            env_kwargs=(),
             demos=self.demos or f"irl/{task}/expert-v0",
             out=self.out or Path("runs") / f"{self.KIND}-{task}-s{self.seed}",
         )

@@ -13,20 +13,28 @@ from irl.demos.generate import generate
 from irl.demos.info import show, table
 from irl.demos.root import datasets_root
 from irl.demos.storage import list_datasets
-from irl.envs.make import make
+from irl.envs.names import full_name
 from irl.envs.tasks import task_name
+from irl.experiment import actors
+from irl.experiment.configs import Words
 from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
-from irl.policies.card import Card
-from irl.policies.policy import check_policy
 
 
 @dataclass(frozen=True)
 class GenerateDemos:
-    """Record episodes of a shelved policy as a Minari dataset, with every reward term."""
+    """Record episodes of a policy as a Minari dataset, with every reward term."""
 
     env_id: str
     """Gymnasium id of the task."""
+    env_kwargs: Words = ()
+    """What the environment is given, name=value or a JSON object."""
+    policy: str = ""
+    """Who acts instead of the shelf's: FILE.zip of Stable-Baselines3, FILE.safetensors of irl, or a function
+    of an observation as module:function. A zip holds pickles, which can run any code: name only one whose
+    maker you trust."""
+    vec_normalize: Path | None = None
+    """Statistics of VecNormalize that belong to the zip, FILE.pkl: a pickle too."""
     episodes: int = 25
     """How many episodes."""
     seed: int = 0
@@ -34,7 +42,7 @@ class GenerateDemos:
     level: str = "expert"
     """Which policy of the shelf acts."""
     dataset_id: str = ""
-    """Name of the dataset; irl/<task>/<level>-v0 unless given."""
+    """Name of the dataset; irl/<task>/<level>-v0 unless given, irl/<task>/own-v0 with --policy."""
     datasets_root: Path | None = None
     """Folder of Minari datasets; MINARI_DATASETS_PATH, or expert_data/datasets, unless given."""
     policies_root: Path | None = None
@@ -46,6 +54,8 @@ class GenerateDemos:
         check_at_least(self, 1, "episodes")
         check_seed(self.seed)
         shelf.check_level(self.level)
+        if self.vec_normalize is not None and not self.policy:
+            raise ValueError("vec_normalize belongs to a policy; name its zip with --policy")
 
 
 @dataclass(frozen=True)
@@ -68,35 +78,36 @@ class ListDemos:
 
 def generate_demos(command: GenerateDemos) -> None:
     """Record the episodes and describe the dataset."""
-    env = make(command.env_id)
-    try:
-        expert = shelf.find(command.env_id, command.level, command.policies_root)
-        check_policy(expert.policy, env)
-    finally:
-        env.close()
-    dataset_id = command.dataset_id or f"irl/{task_name(command.env_id)}/{command.level}-v0"
+    env_id = full_name(command.env_id, command.env_kwargs)
+    root = command.policies_root
+    if command.policy:
+        actor = actors.named(command.policy, env_id, command.vec_normalize, root)
+    else:
+        actor = actors.shelved(env_id, command.level, root)
+    level = "own" if command.policy else command.level
+    dataset_id = command.dataset_id or f"irl/{task_name(env_id)}/{level}-v0"
     with progress(dataset_id, command.episodes) as report:
-        info = generate(
-            command.env_id,
-            expert.policy,
-            dataset_id=dataset_id,
-            root=command.datasets_root,
-            seeds=episode_seeds(command.seed, "demonstrations", command.episodes),
-            algorithm=expert.card.algorithm,
-            author="irl",
-            random_return=expert.card.random_return_mean,
-            expert_return=_reference(command, expert.card),
-            description=f"{command.level} of {command.env_id}, deterministic actions, seed {command.seed}",
-            on_episode=each_episode(report),
-            overwrite=command.overwrite,
-        )
+        try:
+            info = generate(
+                env_id,
+                actor.act,
+                dataset_id=dataset_id,
+                root=command.datasets_root,
+                seeds=episode_seeds(command.seed, "demonstrations", command.episodes),
+                algorithm=actor.algorithm,
+                author="irl",
+                random_return=actor.random_return,
+                expert_return=actor.expert_return,
+                description=f"{actor.called} of {env_id}, deterministic actions, seed {command.seed}",
+                on_episode=each_episode(report),
+                overwrite=command.overwrite,
+            )
+        except ValueError as error:
+            if isinstance(error, UserError) or not command.policy:
+                raise
+            # actions of another shape, or that are not numbers
+            raise UserError(f"--policy {command.policy}: {error}") from error
     Console().print(table(info))
-
-
-def _reference(command: GenerateDemos, card: Card) -> float:
-    """The return that counts as one: the expert's, also where a lesser level acts and an expert is there."""
-    known = [c for c in shelf.cards(command.policies_root) if (c.env_id, c.level) == (card.env_id, "expert")]
-    return (known or [card])[0].measured.return_mean
 
 
 def show_demos(command: ShowDemos) -> None:

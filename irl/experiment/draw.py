@@ -8,6 +8,7 @@ from irl.core.errors import UserError
 from irl.core.records import RunFolder
 from irl.demos.load import Demos, check_task, load_demos
 from irl.envs.make import check_module, make
+from irl.experiment.build import check_learner
 from irl.experiment.configs import Imitation
 
 RECORD = "demonstrations.json"
@@ -27,6 +28,7 @@ def _drawn_of(config: Imitation, root: Path | None) -> Demos:
     env = make(config.env_id)
     try:
         demos = load_demos(config.demos, episodes=config.demo_episodes, seed=config.seed, root=root)
+        check_learner(config.learner.KIND, env)
         check_task(demos, env)
         env.reset(seed=config.seed)
         env.step(demos[0].action[0].astype(env.action_space.dtype))

@@ -18,9 +18,10 @@ from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment, versions
 from irl.core.rng import episode_seeds
 from irl.envs.make import check_module, make
+from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
-from irl.experiment.configs import ExpertRun, Watch
+from irl.experiment.configs import ExpertRun, Watch, Words
 from irl.experiment.play import MAY_CHANGE, Player
 from irl.experiment.progress import each_episode, progress
 from irl.experiment.recipes import recipe
@@ -41,6 +42,8 @@ class TrainExpert:
 
     env_id: str = ""
     """Gymnasium id of the task."""
+    env_kwargs: Words = ()
+    """What the environment is given, name=value or a JSON object."""
     resume: Path | None = None
     """Run folder to go on with, by its own settings; no other is needed."""
     algo: Literal["ppo", "sac"] | None = None
@@ -102,7 +105,11 @@ class ListExperts:
 def train(command: TrainExpert) -> None:
     """Train, measure, write policy and card into the run folder, and shelve them."""
     run = _resumed(command) if command.resume is not None else _expert_run(command)
-    make(run.env_id).close()
+    env = make(run.env_id)
+    try:
+        build.check_learner(run.learner.KIND, env)
+    finally:
+        env.close()
     torch.set_num_threads(run.threads)
     folder = _open_or_create(run)
     algorithm = build.forward(run)
@@ -141,10 +148,11 @@ def _resumed(command: TrainExpert) -> ExpertRun:
 
 
 def _expert_run(command: TrainExpert) -> ExpertRun:
-    algo, chosen = recipe(command.env_id, command.algo)
-    task = task_name(command.env_id)
+    env_id = full_name(command.env_id, command.env_kwargs)
+    algo, chosen = recipe(env_id, command.algo)
+    task = task_name(env_id)
     return ExpertRun(
-        env_id=command.env_id,
+        env_id=env_id,
         level=command.level,
         steps=chosen.steps if command.steps is None else command.steps,
         seed=command.seed,

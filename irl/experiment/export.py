@@ -11,6 +11,7 @@ from rich.console import Console
 from irl.core import files
 from irl.core.errors import UserError
 from irl.core.records import open_run
+from irl.envs.discrete import OneHot
 from irl.envs.make import check_module, make
 from irl.experiment.snapshots import snapshot_of
 from irl.learners.sb3_export import ALGORITHMS, sb3_zip
@@ -84,6 +85,6 @@ def _zip(policy: Policy, source: Path) -> bytes:
     assert isinstance(observations, Box)
     assert isinstance(actions, Box)
     try:
-        return sb3_zip(policy, observations, actions)
+        return sb3_zip(policy, observations, actions.choices if isinstance(actions, OneHot) else actions)
     except ValueError as error:
         raise UserError(f"{source} cannot be a zip of Stable-Baselines3: {error}") from error

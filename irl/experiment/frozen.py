@@ -11,6 +11,7 @@ from irl.core.differences import without
 from irl.core.errors import UserError
 from irl.core.records import RunFolder, open_run
 from irl.envs.make import make
+from irl.experiment.build import check_learner
 from irl.experiment.configs import RetrainRun
 from irl.experiment.snapshots import snapshot_of
 from irl.rewards.artefact import WEIGHTS, LearnedReward, load_reward
@@ -37,6 +38,7 @@ def frozen(config: RetrainRun, snapshot: Path, part: str | None = None) -> Learn
                 f"actions of {takes[1]}; {config.env_id} has {needs[0]} and {needs[1]}: choose the run it "
                 f"belongs to"
             )
+        check_learner(config.learner.KIND, env)
         env.reset(seed=config.seed)
         assert isinstance(box, Box)
         env.step(((box.low + box.high) / 2).astype(box.dtype))

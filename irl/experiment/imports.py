@@ -16,10 +16,9 @@ from irl.demos.importers import import_file
 from irl.demos.info import table
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
+from irl.experiment.configs import Words
 from irl.experiment.judge import finite
 from irl.policies.card import measure_random
-
-Words = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE ...")]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 import torch
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Discrete
 from jaxtyping import Float
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
@@ -29,10 +29,11 @@ from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
 from irl.core.nets import ACTIVATIONS, Normaliser
 from irl.core.types import Metrics, RewardFn, Transitions
+from irl.envs.discrete import OneHot
 from irl.learners import densities
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
-from irl.learners.ppo_update import PPOUpdate
+from irl.learners.ppo_update import PPOUpdate, SB3Update
 from irl.learners.random_state import read_global, write_global
 from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
@@ -157,7 +158,8 @@ class PPOLearner:
         )
         # without one SB3 makes a folder for its own
         self.model.set_logger(Logger(folder=None, output_formats=[]))
-        self._update = PPOUpdate(self.model, config.activation)
+        chosen = isinstance(self.model.action_space, Discrete)
+        self._update = SB3Update(self.model) if chosen else PPOUpdate(self.model, config.activation)
         self._average = WeightAverage(_actor_weights(self.model), config.average)
         _, self._callback = self.model._setup_learn(total_steps, callback=None)
 
@@ -266,13 +268,15 @@ class PPOLearner:
 
     def policy(self) -> Policy:
         """The current policy, exported: a copy that later updates leave alone."""
-        normaliser, box = self._normaliser, self.venv.action_space
+        # the environments' own: rows where SB3 sees choices
+        normaliser, box = self._normaliser, self.venv.venv.action_space
         assert isinstance(box, Box)
         weights = {name: weight.numpy().copy() for name, weight in self._average.weights.items()}
         weights |= {"obs_mean": normaliser.mean.cpu().numpy().copy(), "obs_std": normaliser.std.cpu().numpy()}
         weights |= {"action_low": box.low, "action_high": box.high}
         sizes = (len(normaliser.mean), len(box.low))
-        spec = PolicySpec(self.env_id, *sizes, self.config.hidden, self.config.activation, "gaussian")
+        kind = "categorical" if isinstance(box, OneHot) else "gaussian"
+        spec = PolicySpec(self.env_id, *sizes, self.config.hidden, self.config.activation, kind)
         return Policy(spec, weights)
 
     def state_dict(self) -> dict[str, Any]:
@@ -314,7 +318,7 @@ def _actor_weights(model: PPO) -> dict[str, Tensor]:
     net = model.policy
     layers = [m for m in net.mlp_extractor.policy_net if isinstance(m, nn.Linear)]
     assert isinstance(net.action_net, nn.Linear)
-    weights: dict[str, Tensor] = {"log_std": net.log_std}
+    weights: dict[str, Tensor] = {"log_std": net.log_std} if isinstance(model.action_space, Box) else {}
     for i, layer in enumerate([*layers, net.action_net]):
         weights |= {f"layers.{i}.weight": layer.weight, f"layers.{i}.bias": layer.bias}
     return {name: weight.detach().cpu() for name, weight in weights.items()}

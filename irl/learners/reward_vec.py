@@ -7,7 +7,7 @@
 """
 
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Discrete
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from irl.core.types import RewardFn
@@ -22,7 +22,7 @@ class RewardVecWrapper(VecEnvWrapper):
     inside goes on to count the environment's own reward.
 
     Raises:
-        ValueError: observations or actions are no flat boxes.
+        ValueError: observations are no flat box, or actions neither that nor a choice.
     """
 
     def __init__(self, venv: VecEnv, reward: RewardFn) -> None:
@@ -48,7 +48,7 @@ class RewardVecWrapper(VecEnvWrapper):
         for i in np.flatnonzero(dones).tolist():
             next_obs[i] = infos[i]["terminal_observation"]
             truncated[i] = infos[i].get("TimeLimit.truncated", False)
-        assert isinstance(self.action_space, Box)
+        assert isinstance(self.action_space, Box | Discrete)
         batch = one_step(self._obs, self._actions, next_obs, dones & ~truncated, truncated, self.action_space)
         self._obs = obs
         paid = [{OWN_REWARD: reward} | info for info, reward in zip(infos, own, strict=True)]

@@ -16,19 +16,20 @@ import io
 
 import numpy as np
 import torch
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Discrete
 from stable_baselines3 import PPO, SAC
 from torch import Tensor
 
 from irl.core.nets import ACTIVATIONS, CLIP, MIN_STD
+from irl.envs.discrete import OneHot
 from irl.learners.features import NormalisedFeatures
 from irl.policies.policy import Policy
 
-ALGORITHMS: dict[str, type[PPO] | type[SAC]] = {"gaussian": PPO, "squashed_gaussian": SAC}
+ALGORITHMS: dict[str, type[PPO] | type[SAC]] = {"gaussian": PPO, "squashed_gaussian": SAC, "categorical": PPO}
 """By a policy's distribution."""
 
 
-def sb3_zip(policy: Policy, observations: Box, actions: Box) -> bytes:
+def sb3_zip(policy: Policy, observations: Box, actions: Box | Discrete) -> bytes:
     """The zip whose deterministic prediction is the policy's action, within float32's rounding.
 
     Args:
@@ -46,7 +47,7 @@ def sb3_zip(policy: Policy, observations: Box, actions: Box) -> bytes:
     return buffer.getvalue()
 
 
-def _untrained(policy: Policy, observations: Box, actions: Box) -> PPO | SAC:
+def _untrained(policy: Policy, observations: Box, actions: Box | Discrete) -> PPO | SAC:
     """A model of the policy's shape, built as SB3's own `load` does it: from spaces, with no environment."""
     shape = {
         "net_arch": list(policy.spec.hidden),
@@ -83,12 +84,12 @@ def _weights(policy: Policy, names: dict[str, Tensor]) -> dict[str, Tensor]:
         for i in range(last):
             # every second module is an activation
             found[f"{body}.{2 * i}.{part}"] = given[f"layers.{i}.{part}"]
-    if not squashed:
+    if policy.spec.distribution == "gaussian":
         found["log_std"] = given["log_std"]
-    elif "log_std" in given:
+    elif squashed and "log_std" in given:
         found["actor.log_std.weight"] = torch.zeros_like(names["actor.log_std.weight"])
         found["actor.log_std.bias"] = given["log_std"]
-    else:
+    elif squashed:
         found |= {f"actor.log_std.{part}": given[f"log_std.{part}"] for part in ("weight", "bias")}
     # actor and critics have an extractor each, or share one under several names
     for name in names:
@@ -99,13 +100,18 @@ def _weights(policy: Policy, names: dict[str, Tensor]) -> dict[str, Tensor]:
     return found
 
 
-def _check(policy: Policy, observations: Box, actions: Box) -> None:
+def _check(policy: Policy, observations: Box, given: Box | Discrete) -> None:
     spec, weights = policy.spec, policy.weights
+    actions = OneHot(given) if isinstance(given, Discrete) else given
     if (observations.shape, actions.shape) != ((spec.obs_dim,), (spec.action_dim,)):
         raise ValueError(
             f"the policy takes observations of {spec.obs_dim} and gives actions of {spec.action_dim}, the "
             f"spaces have {observations.shape} and {actions.shape}"
         )
+    if isinstance(given, Discrete) and given.start != 0:
+        raise ValueError(f"Stable-Baselines3 knows choices from 0 on, the task has {given}")
+    if isinstance(given, Discrete) != (spec.distribution == "categorical"):
+        raise ValueError(f"the policy is {spec.distribution}, the task's actions are {given}")
     for name, bound in (("action_low", actions.low), ("action_high", actions.high)):
         if not np.array_equal(weights[name], bound.astype(np.float32)):
             raise ValueError(f"the policy's {name} is {weights[name]}, the task's is {bound}")

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import torch
+from gymnasium.spaces import Discrete
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper
 
 from irl.core.types import Transitions
+from irl.envs.discrete import OneHot
 from irl.envs.make import make
 from irl.envs.replayable import Replayable
 
@@ -45,7 +47,11 @@ class RecordingVecEnv(VecEnvWrapper):
         def builder() -> Replayable:
             return Replayable(make(env_id, **(env_kwargs or {})))
 
-        super().__init__(Envs([builder for _ in seeds]))
+        inner = Envs([builder for _ in seeds])
+        self._rows = inner.action_space if isinstance(inner.action_space, OneHot) else None
+        # SB3 knows choices from 0 on
+        choices = Discrete(len(self._rows.low)) if self._rows is not None else None
+        super().__init__(inner, action_space=choices)
         self._first_seeds = list(seeds)
         self._steps: list[tuple[np.ndarray, ...]] = []
         self._returns, self._lengths = np.zeros(len(seeds)), np.zeros(len(seeds), dtype=np.int64)
@@ -59,7 +65,9 @@ class RecordingVecEnv(VecEnvWrapper):
         return self._obs
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Hand over the actions; the caller has clipped them to the bounds."""
+        """Hand over the actions; the caller has clipped them to the bounds. Choices become rows here."""
+        if self._rows is not None:
+            actions = np.eye(len(self._rows.low), dtype=np.float32)[np.asarray(actions)]
         self._actions = np.array(actions, copy=True)
         self.venv.step_async(actions)
 

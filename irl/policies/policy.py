@@ -3,6 +3,7 @@
     x = clip((obs - mean) / std, -c, c);  m = mlp(x)
     gaussian:           action = clip(m, low, high)
     squashed_gaussian:  action = low + (tanh(m) + 1) / 2 * (high - low)
+    categorical:        action = the row of zeros with a one where m is largest
 
 Saved as one safetensors file whose header holds the specification as JSON. About 15 microseconds a
 call for two hidden layers of 64.
@@ -26,7 +27,7 @@ from irl.core.nets import CLIP
 
 FORMAT, VERSION = "irl.policy", 1
 _ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
-_DISTRIBUTIONS = ("gaussian", "squashed_gaussian")
+_DISTRIBUTIONS = ("gaussian", "squashed_gaussian", "categorical")
 
 
 @dataclass(frozen=True)
@@ -39,15 +40,16 @@ class PolicySpec:
     hidden: tuple[int, ...]
     activation: str
     distribution: str
-    """`gaussian` (clipped to the bounds) or `squashed_gaussian` (tanh, scaled to the bounds)."""
+    """`gaussian` (clipped to the bounds), `squashed_gaussian` (tanh, scaled to the bounds), or
+    `categorical` (a choice of actions, each a row with a single one)."""
 
 
 class Policy:
     """An exported policy: call it with an observation to get the mean action in environment units.
 
     Weights are `layers.<i>.weight (out, in)`, `layers.<i>.bias`, `log_std (A,)` or, for a
-    state-dependent one, `log_std.weight (A, H)` and `log_std.bias`, `obs_mean`, `obs_std (O,)`,
-    `action_low` and `action_high (A,)`, and `obs_clip ()` unless the bound is 10.
+    state-dependent one, `log_std.weight (A, H)` and `log_std.bias` (a choice has neither), `obs_mean`,
+    `obs_std (O,)`, `action_low` and `action_high (A,)`, and `obs_clip ()` unless the bound is 10.
     """
 
     def __init__(self, spec: PolicySpec, weights: dict[str, np.ndarray]) -> None:
@@ -74,6 +76,9 @@ class Policy:
         """An action drawn from the policy's own distribution."""
         features = self._features(obs)
         mean = self._mean(features)
+        if self.spec.distribution == "categorical":
+            # the largest of logits with Gumbel noise is drawn with the probability that they say
+            return self._bounded(mean + rng.gumbel(size=len(mean)))
         std = np.exp(self._log_std(features))
         noise = rng.standard_normal(len(mean), dtype=np.float32)
         return self._bounded(mean + std * noise)
@@ -97,6 +102,8 @@ class Policy:
         return np.clip(head, -20.0, 2.0)
 
     def _bounded(self, action: np.ndarray) -> np.ndarray:
+        if self.spec.distribution == "categorical":
+            return (np.arange(len(action)) == np.argmax(action)).astype(np.float32)
         if self.spec.distribution == "squashed_gaussian":
             return self._low + (np.tanh(action) + 1.0) / 2.0 * (self._high - self._low)
         return np.minimum(np.maximum(action, self._low), self._high)
@@ -114,7 +121,7 @@ class Policy:
             expected |= {f"layers.{i}.weight": (outputs, inputs), f"layers.{i}.bias": (outputs,)}
         if "log_std" in self.weights:
             expected["log_std"] = sizes[-1:]
-        else:
+        elif spec.distribution != "categorical":
             expected |= {"log_std.weight": (sizes[-1], sizes[-2]), "log_std.bias": sizes[-1:]}
         for name, shape in expected.items():
             found = self.weights[name].shape if name in self.weights else None

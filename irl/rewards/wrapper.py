@@ -9,9 +9,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import torch
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Discrete
 
 from irl.core.types import RewardFn, Transitions
+from irl.envs.discrete import OneHot
 
 OWN_REWARD = "own_reward"
 """Where the environment's own reward goes in `info`."""
@@ -24,7 +25,7 @@ class RewardWrapper(gym.Wrapper):
     give it the observations that the reward was learned on.
 
     Raises:
-        ValueError: observations or actions are no flat boxes.
+        ValueError: observations are no flat box, or actions neither that nor a choice.
     """
 
     def __init__(self, env: gym.Env, reward: RewardFn) -> None:
@@ -48,7 +49,7 @@ class RewardWrapper(gym.Wrapper):
         obs, own, terminated, truncated, info = self.env.step(action)
         if self._obs is None:
             raise gym.error.ResetNeeded("reset the environment before its first step")
-        assert isinstance(self.action_space, Box)
+        assert isinstance(self.action_space, Box | Discrete)
         after = np.array(obs, dtype=np.float32)
         batch = one_step(
             self._obs[None],
@@ -66,9 +67,10 @@ def check_spaces(observation: gym.Space, action: gym.Space) -> None:
     """Refuse spaces that `Transitions` cannot hold.
 
     Raises:
-        ValueError: one is no flat box; it is named.
+        ValueError: one is no flat box, nor a choice of actions; it is named.
     """
-    for name, space in (("observations", observation), ("actions", action)):
+    rows = OneHot(action) if isinstance(action, Discrete) else action
+    for name, space in (("observations", observation), ("actions", rows)):
         if not isinstance(space, Box) or len(space.shape) != 1:
             raise ValueError(f"a reward reads {name} of a flat Box, the environment has {space}")
 
@@ -79,10 +81,16 @@ def one_step(
     next_obs: np.ndarray,
     terminated: np.ndarray,
     truncated: np.ndarray,
-    space: Box,
+    space: Box | Discrete,
 ) -> Transitions:
-    """One step of N environments, actions clipped to the bounds: what the environment saw."""
-    clipped = np.clip(action, space.low, space.high)
+    """One step of N environments, actions clipped to the bounds: what the environment saw.
+
+    Choices become rows.
+    """
+    if isinstance(space, Discrete):
+        clipped = OneHot(space).rows(action)
+    else:
+        clipped = np.clip(action, space.low, space.high)
     return Transitions(
         torch.as_tensor(obs, dtype=torch.float32),
         torch.as_tensor(clipped, dtype=torch.float32),

@@ -3,6 +3,7 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Dict, Discrete
 
 from irl.core.errors import UserError
@@ -70,9 +71,9 @@ def test_parts_in_the_order_they_are_named() -> None:
 
 
 def test_a_dictionary_is_flattened_where_its_parts_are_named(monkeypatch) -> None:
-    spec = gym.envs.registration.EnvSpec("Parts-v0", Parts, max_episode_steps=5, disable_env_checker=True)
+    spec = EnvSpec("Parts-v0", Parts, max_episode_steps=5, disable_env_checker=True)
     monkeypatch.setitem(gym.registry, "Parts-v0", spec)
-    with pytest.raises(UserError, match='--env-kwargs \'{"obs_keys"'):
+    with pytest.raises(UserError, match=r'--env-kwargs .\{"obs_keys"'):
         make("Parts-v0")
     env = make('Parts-v0?{"obs_keys": ["goal"]}')
     assert env.observation_space.shape == (2,)

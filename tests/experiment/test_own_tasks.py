@@ -1,0 +1,154 @@
+"""Tasks that are not MuJoCo's: with a choice of actions, in a module of the user's, with arguments."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+
+from irl.core.records import open_run
+from irl.core.types import Episode, from_episodes
+from irl.envs.rollouts import rollouts
+from irl.policies.policy import load_policy
+from irl.rewards.artefact import load_reward
+from irl.rewards.wrapper import RewardWrapper
+from tests.demos.files import flat, write_npz
+from tests.experiment.conftest import QUICK, TASK
+
+Command = Callable[..., None]
+
+FAST = ("--learner.n-epochs=10", "--watch.eval-every=0", "--watch.no-progress", "--watch.no-tensorboard")
+
+
+def balance(obs: np.ndarray) -> np.ndarray:
+    """Pushes the cart below the pole: 500 of 500 steps, every time."""
+    return np.asarray(int(obs @ np.array([0.1, 0.4, 3.0, 1.0]) > 0))
+
+
+def cartpole(irl: Command, episodes: int = 6) -> None:
+    """Import demonstrations of CartPole from an npz with choices as whole numbers."""
+    made = rollouts("CartPole-v1", balance, range(episodes))
+    assert [len(episode) for episode in made] == [500] * episodes
+    arrays = flat(made)
+    write_npz(Path("cartpole.npz"), arrays | {"actions": arrays["actions"].argmax(1)})
+    irl("demos", "import", "cartpole.npz", "--env-id", "CartPole-v1", "--datasets-root", "ds")
+
+
+TRAIN = ["train", "gail", "--env-id", "CartPole-v1", "--demos", "irl/cartpole/imported-v0", "--out", "run"]
+TRAIN += ["--datasets-root", "ds"]
+
+
+@pytest.mark.slow
+def test_gail_balances_cartpole_from_imported_demonstrations(irl: Command) -> None:
+    cartpole(irl)
+    irl(*TRAIN, "--seed", 0, "--steps", 16_384, *FAST)
+    irl("evaluate", "run", "--episodes", 20, "--seed", 5)
+    found = json.loads(Path("run/evaluation.json").read_text())
+    assert found["policy"]["return_mean"] >= 475.0
+    assert found["policy"]["normalised_score"] >= 0.94
+
+
+def test_what_is_learned_of_a_choice_is_evaluated_exported_and_paid(irl: Command) -> None:
+    cartpole(irl)
+    irl(*TRAIN, *QUICK)
+    irl("evaluate", "run", "--episodes", 2)
+    assert json.loads(Path("run/evaluation.json").read_text())["policy"]["normalised_score"] is not None
+    assert Path("run/report.html").is_file()
+    irl("retrain", "run", "--steps", 128, "--ppo.n-envs=2", "--ppo.steps-per-round=128", "--ppo.batch-size=64",
+        "--out", "again", "--watch.no-progress")  # fmt: skip
+    _, snapshot = list(open_run(Path("run")).snapshots().items())[-1]
+    policy = load_policy(snapshot / "policy.safetensors")
+    assert policy.spec.distribution == "categorical"
+    (episode,) = rollouts("CartPole-v1", policy, [3])
+    _exported(irl, episode.obs, episode.action)
+    _paid(episode, snapshot)
+
+
+def _exported(irl: Command, obs: np.ndarray, action: np.ndarray) -> None:
+    irl("export", "run", "--out", "policy.zip")
+    model = PPO.load("policy.zip", device="cpu")
+    chosen, _ = model.predict(obs[:-1].astype(np.float32), deterministic=True)
+    np.testing.assert_array_equal(chosen, action.argmax(1))
+
+
+def _paid(episode: Episode, snapshot: Path) -> None:
+    """The learned reward around the environment itself, which takes choices."""
+    reward = load_reward(snapshot)
+    env = RewardWrapper(gym.make("CartPole-v1"), reward)
+    env.reset(seed=3)
+    paid = [env.step(int(choice))[1] for choice in episode.action.argmax(1)]
+    with torch.no_grad():
+        expected = reward(from_episodes([episode])).tolist()
+    np.testing.assert_allclose(paid, expected, rtol=1e-4)
+    env.close()
+
+
+def test_sac_is_refused_where_actions_are_a_choice(irl: Command, capfd: pytest.CaptureFixture) -> None:
+    cartpole(irl, 1)
+    demos = "--demos irl/cartpole/imported-v0 --demo-episodes 1 --datasets-root ds"
+    commands = (
+        f"train dac --env-id CartPole-v1 {demos}",
+        "experts train --env-id CartPole-v1 --algo sac --policies-root shelf",
+    )
+    for words in commands:
+        with pytest.raises(SystemExit):
+            irl(*words.split(), "--out", "refused")
+        assert (
+            "SAC takes actions that are real numbers, CartPole-v1 has a choice of 2" in capfd.readouterr().err
+        )
+        assert not Path("refused").exists()
+
+
+THEIRS = """
+import gymnasium as gym
+from tests.pointmass import PointMass
+
+# as a function, which Gymnasium cannot write down
+make = lambda **kwargs: PointMass(**kwargs)
+gym.register("Theirs-v0", make, max_episode_steps=30, disable_env_checker=True)
+
+def act(obs):
+    return -5 * obs
+"""
+
+
+@pytest.fixture
+def theirs() -> str:
+    """A module in the working folder that registers a task."""
+    Path("their_task_module.py").write_text(THEIRS)
+    return "their_task_module"
+
+
+def test_a_task_of_a_module_with_arguments(
+    irl: Command, theirs: str, capfd: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "ds")
+    task = ("--env-id", "Theirs-v0", "--env-kwargs", "cliff=1.2", "--import", theirs)
+    with pytest.raises(SystemExit):
+        irl("demos", "generate", *task[:2], "--policy", "x:y")
+    assert "--import MODULE" in capfd.readouterr().err
+    irl("demos", "generate", *task, "--episodes", 3, "--policy", f"{theirs}:act", "--dataset-id", "irl/t-v0")
+    irl("train", "gail", *task, "--demos", "irl/t-v0", "--demo-episodes", 2, "--out", "run", *QUICK)
+    config = json.loads(Path("run/config.json").read_text())
+    assert (config["env_id"], config["env_kwargs"]) == ('Theirs-v0?{"cliff":1.2}', [])
+    irl("evaluate", "run", "--episodes", 2)
+    irl("train", "--resume", "run")
+    # another process does not know the task, until it is named again
+    monkeypatch.delitem(gym.registry, "Theirs-v0")
+    monkeypatch.delitem(sys.modules, theirs)
+    with pytest.raises(SystemExit):
+        irl("evaluate", "run", "--episodes", 2)
+    assert "--import MODULE" in capfd.readouterr().err
+    irl("evaluate", "run", "--episodes", 2, f"--import={theirs}")
+
+
+def test_arguments_change_the_task_that_is_trained_in(irl: Command) -> None:
+    irl("train", "gail", "--env-id", TASK, "--env-kwargs", '{"cliff": 0.05}', "--out", "run", *QUICK,
+        "--demos", "irl/pointmass/expert-v0")  # fmt: skip
+    irl("evaluate", "run", "--episodes", 3)
+    assert json.loads(Path("run/evaluation.json").read_text())["policy"]["length_min"] < 30
