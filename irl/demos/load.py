@@ -95,8 +95,10 @@ def load_demos(
     )
 
 
-def check_task(demos: Demos, env: gym.Env) -> None:
+def check_task(demos: Demos, env: gym.Env, *, seen: bool = True) -> None:
     """Refuse demonstrations of another task than `env`'s, and actions that it would not take.
+
+    Without actions they are refused where those are `seen` by who learns from them.
 
     Other shapes are always refused; equal ones where both tasks are known and differ, as Walker2d and
     HalfCheetah.
@@ -108,7 +110,12 @@ def check_task(demos: Demos, env: gym.Env) -> None:
     wanted = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
     has = demos[0].obs.shape[1], demos[0].action.shape[1]
     needs = (env.observation_space.shape or (0,))[0], (env.action_space.shape or (0,))[0]
-    if has != needs:
+    if has[1] == 0 and seen:
+        raise UserError(
+            f"demonstrations {demos.dataset_id} have no actions, which the discriminator judges; let it "
+            f"judge states or pairs of them: --discriminator.inputs obs, or obs_next_obs"
+        )
+    if has[0] != needs[0] or has[1] not in (0, needs[1]):
         raise UserError(
             f"demonstrations of {shown} have observations of {has[0]} and actions of {has[1]}; "
             f"{wanted} has {needs[0]} and {needs[1]}"
@@ -118,7 +125,8 @@ def check_task(demos: Demos, env: gym.Env) -> None:
             f"demonstrations of {shown} are not of {wanted}, though both have observations of {has[0]} and "
             f"actions of {has[1]}"
         )
-    _check_actions(demos, wanted, env.action_space)
+    if has[1]:
+        _check_actions(demos, wanted, env.action_space)
 
 
 def _check_actions(demos: Demos, wanted: str, space: gym.Space) -> None:

@@ -51,6 +51,8 @@ class GAILConfig:
     """Divide each layer by its largest singular value: the slope of the logit is then at most 1."""
     absorbing_scale: float = 0.0
     """Distance of the absorbing state from all others; 0: there is none."""
+    inputs: Literal["obs_action", "obs", "obs_next_obs"] = "obs_action"
+    """What D judges a step by. The last two learn from demonstrations without actions."""
     products: Literal["float32", "bfloat16"] = "float32"
     """Number format of what hidden layers exchange while D learns. bfloat16 rounds to three digits."""
 
@@ -79,7 +81,8 @@ class GAIL:
         """
         self.config, self.rng, self.gamma, self.reward_map = config, rng, gamma, config.reward_map
         shape = (config.hidden, config.activation, config.absorbing_scale, config.spectral_norm)
-        self.net = LogitNet(LogitSpec(obs_dim, action_dim, *shape), normaliser, init_rng).to(rng.device)
+        spec = LogitSpec(obs_dim, action_dim, *shape, sees=config.inputs)
+        self.net = LogitNet(spec, normaliser, init_rng).to(rng.device)
         dtype = torch.bfloat16 if config.products == "bfloat16" else torch.float32
         self._slopes = Slopes(self.net, dtype)
         self.optimizer = torch.optim.Adam(self._slopes.trained, lr=config.lr, fused=True)

@@ -18,6 +18,7 @@ from irl.discriminators.dac import DAC, DACConfig
 from irl.discriminators.gail import GAIL
 from irl.envs.absorbing import subsample
 from irl.envs.discrete import OneHot
+from irl.envs.make import make as make_env
 from irl.experiment.configs import (
     AIRLRun,
     AIRLSACRun,
@@ -89,7 +90,7 @@ def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | I
 def _discriminator(
     config: Imitation, expert: Transitions, normaliser: Normaliser, learner: PPOLearner | SACLearner
 ) -> GAIL | AIRL:
-    sizes = expert.obs.shape[1], expert.action.shape[1]
+    sizes = expert.obs.shape[1], expert.action.shape[1] or _action_size(config.env_id)
     shared = {
         "normaliser": normaliser,
         "init_rng": torch_stream(config.seed, "discriminator weights"),
@@ -103,6 +104,14 @@ def _discriminator(
             return DAC(*sizes, settings, **shared)
         case settings:
             return GAIL(*sizes, settings, **shared)
+
+
+def _action_size(env_id: str) -> int:
+    env = make_env(env_id)
+    env.close()
+    # `make` admits flat boxes only
+    assert env.action_space.shape is not None
+    return env.action_space.shape[0]
 
 
 def forward(config: ExpertRun) -> Forward:

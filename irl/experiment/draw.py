@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+from gymnasium.spaces import Box
+
 from irl.core import files
 from irl.core.errors import UserError
 from irl.core.records import RunFolder
@@ -10,6 +12,7 @@ from irl.demos.load import Demos, check_task, load_demos
 from irl.envs.make import check_module, make
 from irl.experiment.build import check_learner
 from irl.experiment.configs import Imitation
+from irl.experiment.judge import finite
 
 RECORD = "demonstrations.json"
 
@@ -29,9 +32,12 @@ def _drawn_of(config: Imitation, root: Path | None) -> Demos:
     try:
         demos = load_demos(config.demos, episodes=config.demo_episodes, seed=config.seed, root=root)
         check_learner(config.learner.KIND, env)
-        check_task(demos, env)
+        check_task(demos, env, seen=config.discriminator.inputs == "obs_action")
         env.reset(seed=config.seed)
-        env.step(demos[0].action[0].astype(env.action_space.dtype))
+        box = env.action_space
+        assert isinstance(box, Box)
+        action = demos[0].action[0] if demos[0].action.shape[1] else (box.low + box.high) / 2
+        env.step(action.astype(box.dtype))
         return demos
     finally:
         env.close()
@@ -43,8 +49,9 @@ def drawn(demos: Demos) -> dict[str, Any]:
         "dataset": demos.dataset_id,
         "episodes": list(demos.indices),
         "held_out": list(demos.held_out_indices),
-        "returns": [episode.return_ for episode in demos],
-        "held_out_returns": [episode.return_ for episode in demos.held_out],
+        # None: not recorded
+        "returns": [finite(episode.return_) for episode in demos],
+        "held_out_returns": [finite(episode.return_) for episode in demos.held_out],
     }
 
 

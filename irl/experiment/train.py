@@ -22,6 +22,7 @@ from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
 from irl.policies.policy import save_policy
 from irl.rewards.artefact import RewardSpec, save_reward
+from irl.rewards.nets import SEES, LogitSpec
 
 
 @dataclass(frozen=True)
@@ -113,5 +114,5 @@ def _snapshot(config: Imitation, demos: Demos, algorithm: Adversarial | Interlea
 
 
 def _inputs(discriminator: GAIL | AIRL) -> str:
-    sees_all = isinstance(discriminator, GAIL) or discriminator.net.spec.inputs == "obs_action"
-    return "obs, action" if sees_all else "obs"
+    spec = discriminator.net.spec
+    return SEES[spec.sees if isinstance(spec, LogitSpec) else spec.inputs]

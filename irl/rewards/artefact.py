@@ -7,7 +7,7 @@ It takes task observations and environment-unit actions, and gives the reward be
 learner did (`reward_scale` in the specification records that). One that knows the absorbing state adds the
 indicator itself, and what that state pays at a termination (`irl.rewards.tail`). No pickle is read.
 
-Version 1 had no absorbing state and no spectral norm, version 2 logits only; they are read as such.
+Version 1 had no absorbing state and no spectral norm, version 2 logits of (s, a) only; they are read as such.
 """
 
 import itertools
@@ -37,6 +37,8 @@ READABLE = [(FORMAT, version) for version in range(1, VERSION + 1)]
 SPEC, WEIGHTS = "spec.json", "weights.safetensors"
 ADDED_IN_2 = {"absorbing_scale": 0.0, "spectral_norm": False}
 """Settings of the network that version 1 did not have."""
+ADDED_IN_3 = {"sees": "obs_action"}
+"""Settings that version 2 did not have."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class RewardSpec:
     reward_map: str
     """Of a logit, a name in `irl.rewards.maps.MAPS`; of g and h, a name in `irl.rewards.shaped.PARTS`."""
     inputs: str
-    """What the network sees: `obs, action`, or `obs`."""
+    """What the network sees, in words: `obs, action`."""
     net: LogitSpec | ShapedSpec
     gamma: float
     """The discount of the learner it was learned beside, and of what the absorbing state pays."""
@@ -89,7 +91,8 @@ class LearnedReward:
 
     def _check(self, batch: Transitions) -> None:
         given, expected = (batch.obs.shape[1], batch.action.shape[1]), self.spec.net
-        if given != (expected.obs_dim, expected.action_dim):
+        blind = expected.sees != "obs_action"
+        if given[0] != expected.obs_dim or (given[1] != expected.action_dim and not blind):
             raise ValueError(
                 f"the reward of {self.spec.env_id} takes observations of {expected.obs_dim} and actions of "
                 f"{expected.action_dim}, the batch has {given[0]} and {given[1]}"
@@ -145,7 +148,7 @@ def _specification(folder: Path, content: Any) -> RewardSpec:
     if (digest := files.sha256(folder / WEIGHTS)) != (named := content.pop("weights_sha256")):
         raise ValueError(f"{WEIGHTS} has sha256 {digest[:12]}, {SPEC} says {named!r:.14}")
     if version < VERSION and isinstance(content.get("net"), dict):
-        added = ADDED_IN_2 if version == 1 else {}
+        added = ADDED_IN_3 | (ADDED_IN_2 if version == 1 else {})
         content["net"] = added | content["net"] | {"kind": LogitSpec.KIND}
     spec = from_json(RewardSpec, content, SPEC)
     if spec.reward_map not in (known := _payable(spec.net)):

@@ -164,7 +164,7 @@ class Bare(gym.Env):
 
 
 def test_an_environment_registered_as_a_function(tmp_path, monkeypatch) -> None:
-    spec = EnvSpec("Bare-v0", lambda: Bare(), max_episode_steps=5, disable_env_checker=True)
+    spec = EnvSpec("Bare-v0", lambda **_: Bare(), max_episode_steps=5, disable_env_checker=True)
     monkeypatch.setitem(gym.registry, "Bare-v0", spec)
     words = {"algorithm": "a", "author": "b", "random_return": 0.0, "expert_return": 1.0, "description": ""}
     info = generate("Bare-v0", lambda obs: np.zeros(1), dataset_id="a-v0", root=tmp_path, seeds=[0], **words)

@@ -71,7 +71,7 @@ def test_parts_in_the_order_they_are_named() -> None:
 
 
 def test_a_dictionary_is_flattened_where_its_parts_are_named(monkeypatch) -> None:
-    spec = EnvSpec("Parts-v0", Parts, max_episode_steps=5, disable_env_checker=True)
+    spec = EnvSpec("Parts-v0", lambda **_: Parts(), max_episode_steps=5, disable_env_checker=True)
     monkeypatch.setitem(gym.registry, "Parts-v0", spec)
     with pytest.raises(UserError, match=r'--env-kwargs .\{"obs_keys"'):
         make("Parts-v0")

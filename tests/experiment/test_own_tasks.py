@@ -17,6 +17,7 @@ from irl.envs.rollouts import rollouts
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
 from irl.rewards.wrapper import RewardWrapper
+from tests import pointmass
 from tests.demos.files import flat, write_npz
 from tests.experiment.conftest import QUICK, TASK
 
@@ -59,8 +60,8 @@ def test_what_is_learned_of_a_choice_is_evaluated_exported_and_paid(irl: Command
     irl("evaluate", "run", "--episodes", 2)
     assert json.loads(Path("run/evaluation.json").read_text())["policy"]["normalised_score"] is not None
     assert Path("run/report.html").is_file()
-    irl("retrain", "run", "--steps", 128, "--ppo.n-envs=2", "--ppo.steps-per-round=128", "--ppo.batch-size=64",
-        "--out", "again", "--watch.no-progress")  # fmt: skip
+    small = ("--ppo.n-envs=2", "--ppo.steps-per-round=128", "--ppo.batch-size=64", "--watch.no-progress")
+    irl("retrain", "run", "--steps", 128, "--out", "again", *small)
     _, snapshot = list(open_run(Path("run")).snapshots().items())[-1]
     policy = load_policy(snapshot / "policy.safetensors")
     assert policy.spec.distribution == "categorical"
@@ -152,3 +153,23 @@ def test_arguments_change_the_task_that_is_trained_in(irl: Command) -> None:
         "--demos", "irl/pointmass/expert-v0")  # fmt: skip
     irl("evaluate", "run", "--episodes", 3)
     assert json.loads(Path("run/evaluation.json").read_text())["policy"]["length_min"] < 30
+
+
+@pytest.mark.parametrize("inputs", ["obs", "obs_next_obs"])
+def test_demonstrations_without_actions(inputs: str, irl: Command, capfd: pytest.CaptureFixture) -> None:
+    arrays = flat(pointmass.demonstrations(4))
+    write_npz(Path("states.npz"), {k: v for k, v in arrays.items() if k not in ("actions", "rewards")})
+    irl("demos", "import", "states.npz", "--env-id", TASK, "--name", "irl/states-v0", "--datasets-root", "ds")
+    words = ("train", "gail", "--env-id", TASK, "--demos", "irl/states-v0", "--datasets-root", "ds", *QUICK)
+    with pytest.raises(SystemExit):
+        irl(*words, "--demo-episodes=3", "--out", "refused")
+    assert "have no actions" in (said := capfd.readouterr().err)
+    assert "--discriminator.inputs obs" in said
+    irl(*words, "--demo-episodes=3", "--discriminator.inputs", inputs, "--out", "run")
+    irl("evaluate", "run", "--episodes", 2)
+    found = json.loads(Path("run/evaluation.json").read_text())
+    assert found["reward"]["auroc"] is not None
+    assert found["references"]["demonstrations"]["return_mean"] is None
+    reward = load_reward(Path("run"))
+    assert (reward.spec.net.sees, reward.spec.net.action_dim) == (inputs, 2)
+    irl("train", "--resume", "run")

@@ -86,7 +86,9 @@ def test_an_older_version_on_an_older_version_of_the_task() -> None:
 
 def test_spaces_of_another_dtype(tmp_path) -> None:
     class Single(gym.ObservationWrapper):
-        observation_space = gym.spaces.Box(-np.inf, np.inf, (11,), np.float32)
+        def __init__(self, env: gym.Env) -> None:
+            super().__init__(env)
+            self.observation_space = gym.spaces.Box(-np.inf, np.inf, (11,), np.float32)
 
         def observation(self, observation: np.ndarray) -> np.ndarray:
             return observation.astype(np.float32)

@@ -104,7 +104,9 @@ FILES = {
     "an episode longer than the task": npz(
         "episode 0",
         "ends after 30",
-        **{name: np.zeros((40, *values.shape[1:])) for name, values in good().items()},
+        observations=np.zeros((40, 2)),
+        actions=np.zeros((40, 2)),
+        timeouts=np.zeros(40, bool),
     ),
     "a task that is not there": Case(
         "demos import demos.npz --env-id PointMas-v0",

@@ -97,6 +97,7 @@ def test_the_specification_is_plain_json(folder: Path) -> None:
         "activation": "tanh",
         "absorbing_scale": 0.0,
         "spectral_norm": False,
+        "sees": "obs_action",
     }
     assert content["provenance"] == REWARD.provenance
     assert content["weights_sha256"] == files.sha256(folder / WEIGHTS)
@@ -107,7 +108,7 @@ def test_the_specification_is_plain_json(folder: Path) -> None:
 def test_a_reward_of_an_older_version_is_read_as_it_was(folder: Path, version: int) -> None:
     def as_it_was(content: dict[str, Any]) -> None:
         content["version"] = version
-        for name in ("kind", "absorbing_scale", "spectral_norm") if version == 1 else ("kind",):
+        for name in ("kind", "sees", "absorbing_scale", "spectral_norm")[: 4 if version == 1 else 2]:
             del content["net"][name]
 
     now = load_reward(folder)
@@ -167,6 +168,7 @@ def test_a_place_without_a_reward_is_refused(tmp_path: Path, below: str) -> None
         (lambda c: c.update(reward_map="airy"), "unknown map 'airy'; known: gail"),
         (lambda c: c.update(extra=1), "spec.json: unknown extra; known: env_id"),
         (lambda c: c.pop("gamma"), "spec.json: missing gamma"),
+        (lambda c: c["net"].update(sees="action"), "sees must be one of obs_action, obs"),
         (lambda c: c.pop("version"), "version"),
         (lambda c: c.pop("weights_sha256"), "weights_sha256"),
         (lambda c: c.update(gamma="high"), "spec.json.gamma: expected float"),

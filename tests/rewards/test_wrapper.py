@@ -128,5 +128,7 @@ def test_a_step_before_the_first_reset_is_refused() -> None:
 
 
 def test_what_a_batch_cannot_hold_is_refused() -> None:
-    with pytest.raises(ValueError, match="actions of a flat Box, the environment has Discrete"):
-        RewardWrapper(gym.make("CartPole-v1"), Seen())
+    env = Bare()
+    env.action_space = gym.spaces.MultiDiscrete([2, 3])
+    with pytest.raises(ValueError, match="actions of a flat Box, the environment has MultiDiscrete"):
+        RewardWrapper(env, Seen())
