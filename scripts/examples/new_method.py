@@ -1,7 +1,7 @@
 """A new method in 60 lines: least-squares GAIL, which irl does not have.
 
-    D  <-  argmin  E_expert[(h(s,a) - 1)^2] + E_policy[(h(s,a) + 1)^2]     the loss of least-squares GANs
-    r  =   1 - (h(s,a) - 1)^2 / 4                                          at most 1, where D takes it for expert
+    D  <-  argmin  E_expert[(h(s,a) - 1)^2] + E_policy[(h(s,a) + 1)^2]     as least-squares GANs have it
+    r  =   1 - (h(s,a) - 1)^2 / 4                                          at most 1, for a sure expert
 
 A method is a loss, a penalty and a map from the logit to the reward. Collecting, rewarding after the rollout,
 time limits, normalisers, checkpoints and all the rest are irl's.

@@ -113,8 +113,16 @@ def test_ppo_learns_from_it_and_not_from_the_environments_own() -> None:
 
 
 def test_what_a_batch_cannot_hold_is_refused() -> None:
-    with pytest.raises(ValueError, match="actions of a flat Box"):
-        vector("CartPole-v1", Seen())
+    with pytest.raises(ValueError, match="observations of a flat Box"):
+        vector("FrozenLake-v1", Seen())
+
+
+def test_choices_are_paid_as_rows() -> None:
+    venv = vector("CartPole-v1", lambda batch: batch.action[:, 1])
+    venv.reset()
+    chosen = np.arange(venv.num_envs) % 2
+    _, paid, _, _ = venv.step(chosen)
+    np.testing.assert_array_equal(paid, chosen)
 
 
 def test_the_public_name_is_this_class_and_importing_irl_does_not_import_sb3() -> None:
