@@ -22,7 +22,7 @@ from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
 from irl.policies.policy import save_policy
 from irl.rewards.artefact import RewardSpec, save_reward
-from irl.rewards.nets import SEES, LogitSpec
+from irl.rewards.nets import SEES
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def _snapshot(config: Imitation, demos: Demos, algorithm: Adversarial | Interlea
         env_id=config.env_id,
         method=config.KIND,
         reward_map=discriminator.reward_map,
-        inputs=_inputs(discriminator),
+        inputs=SEES[discriminator.net.spec.sees],
         net=discriminator.net.spec,
         gamma=config.learner.gamma,
         reward_scale=learner.reward_scale,
@@ -111,8 +111,3 @@ def _snapshot(config: Imitation, demos: Demos, algorithm: Adversarial | Interlea
         provenance=drawn(demos) | {"seed": config.seed},
     )
     save_reward(path / "reward", spec, discriminator.net)
-
-
-def _inputs(discriminator: GAIL | AIRL) -> str:
-    spec = discriminator.net.spec
-    return SEES[spec.sees if isinstance(spec, LogitSpec) else spec.inputs]

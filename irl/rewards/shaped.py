@@ -59,6 +59,11 @@ class ShapedSpec:
         return self.obs_dim + (self.absorbing_scale > 0)
 
     @property
+    def sees(self) -> str:
+        """What g judges a step by, as a logit's specification calls it."""
+        return self.inputs
+
+    @property
     def sizes(self) -> tuple[tuple[int, ...], ...]:
         """Units of each layer, of g and of h."""
         seen = self.state + (self.action_dim if self.inputs == "obs_action" else 0)

@@ -182,7 +182,7 @@ def test_a_place_without_a_reward_is_refused(tmp_path: Path, below: str) -> None
         (lambda c: c["net"].update(obs_dim=4), "size mismatch"),
         (lambda c: c.update(net=[3, 2]), "spec.json.net: kind is one of logit, shaped"),
         (lambda c: c["net"].pop("kind"), "spec.json.net: kind is one of logit, shaped"),
-        (lambda c: c["net"].update(kind="shaped"), "spec.json.net: unknown spectral_norm"),
+        (lambda c: c["net"].update(kind="shaped"), "spec.json.net: unknown sees, spectral_norm"),
     ],
 )
 def test_a_specification_that_does_not_fit_is_refused(folder: Path, change, message: str) -> None:
