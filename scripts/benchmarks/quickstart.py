@@ -72,12 +72,13 @@ def one(seed: int, folder: Path) -> dict[str, Any]:
 def main(settings: Settings) -> None:
     """Run every seed, print and write the results."""
     rows = []
+    # before the first result is written: the tree is not clean after it
+    facts = environment(f"python scripts/benchmarks/{command_line()}")
     for seed in settings.seeds:
         with tempfile.TemporaryDirectory() as folder:
             rows.append(one(seed, Path(folder)))
         shown = {name: value for name, value in rows[-1].items() if name != "curve"}
         print(json.dumps(shown), flush=True)
-        facts = environment(f"python scripts/benchmarks/{command_line()}")
         settings.out.parent.mkdir(exist_ok=True)
         settings.out.write_text(json.dumps({"task": ENV_ID, **facts, "rows": rows}, indent=1) + "\n")
 

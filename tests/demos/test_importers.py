@@ -4,7 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas
+import pyarrow as arrow
 import pytest
+from pyarrow import parquet
 
 from irl.core.errors import UserError
 from irl.core.types import Episode
@@ -121,7 +124,6 @@ def test_choices(actions, imported, tmp_path) -> None:
 
 
 def test_a_table_of_pandas(episodes, imported, tmp_path) -> None:
-    pandas = pytest.importorskip("pandas")
     plain = with_ids(flat(episodes))
     columns = {k: v for k, v in plain.items() if v.ndim == 1}
     for name, short in (("observations", "obs"), ("actions", "action"), ("next_observations", "next_obs")):
@@ -132,7 +134,6 @@ def test_a_table_of_pandas(episodes, imported, tmp_path) -> None:
 
 
 def test_parquet_as_lerobot_writes_it(episodes, imported, tmp_path) -> None:
-    arrow = pytest.importorskip("pyarrow")
     plain = with_ids(flat(episodes))
     table = {
         "observation.state": arrow.FixedSizeListArray.from_arrays(plain["observations"].ravel(), 2),
@@ -143,7 +144,7 @@ def test_parquet_as_lerobot_writes_it(episodes, imported, tmp_path) -> None:
         "frame_index": plain["steps"],
         "task": ["go"] * len(plain["steps"]),
     }
-    pytest.importorskip("pyarrow.parquet").write_table(arrow.table(table), tmp_path / "a.parquet")
+    parquet.write_table(arrow.table(table), tmp_path / "a.parquet")
     found = imported(tmp_path / "a.parquet")
     for a, b in zip(found, episodes, strict=True):
         np.testing.assert_array_equal(a.obs, b.obs[:-1])

@@ -23,8 +23,6 @@ FORMATS = ["hdf5", pytest.param("arrow", id="arrow"), pytest.param("parquet", id
 
 
 def written(root: Path, dataset_id: str, buffers: list[EpisodeBuffer], form: str, **more) -> None:
-    if form != "hdf5":
-        pytest.importorskip("pyarrow")
     with minari_at(root):
         minari.create_dataset_from_buffers(dataset_id, buffers, data_format=form, **more)
 
@@ -128,9 +126,6 @@ def test_a_damaged_arrow_dataset_is_one_line(tmp_path) -> None:
 @pytest.mark.parametrize("env_id", ["CartPole-v1", "InvertedPendulum-v5"])
 @pytest.mark.parametrize("form", FORMATS)
 def test_what_minaris_own_collector_wrote(env_id, form, tmp_path) -> None:
-    pytest.importorskip("jax", reason="DataCollector.step needs it")
-    if form != "hdf5":
-        pytest.importorskip("pyarrow")
     with minari_at(tmp_path):
         # with infos, Minari wants every key of a step from the reset too, which MuJoCo's tasks do not tell
         env = DataCollector(gym.make(env_id), record_infos=env_id == "CartPole-v1", data_format=form)

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+import sb3_contrib
 from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
@@ -60,14 +61,12 @@ def test_gsde(tmp_path) -> None:
 
 @pytest.mark.parametrize("name", ["TQC", "TRPO", "ARS", "CrossQ", "QRDQN"])
 def test_algorithms_of_sb3_contrib(name, tmp_path) -> None:
-    contrib = pytest.importorskip("sb3_contrib")
     task = "CartPole-v1" if name == "QRDQN" else "Pendulum-v1"
-    same(getattr(contrib, name)("MlpPolicy", task, **small()), tmp_path / "a.zip", task)
+    same(getattr(sb3_contrib, name)("MlpPolicy", task, **small()), tmp_path / "a.zip", task)
 
 
 def test_a_library_that_is_not_there_is_named(tmp_path, monkeypatch) -> None:
-    contrib = pytest.importorskip("sb3_contrib")
-    contrib.TQC("MlpPolicy", "Pendulum-v1", **small()).save(tmp_path / "a.zip")
+    sb3_contrib.TQC("MlpPolicy", "Pendulum-v1", **small()).save(tmp_path / "a.zip")
     modules = __import__("sys").modules
     for module in [name for name in modules if name.startswith("sb3_contrib")]:
         monkeypatch.setitem(modules, module, None)
