@@ -179,6 +179,7 @@ WATCH = Watch(eval_every=3, tensorboard=False, checkpoint_every_s=0.5)
 GAIL = GAILRun("Hopper-v5")
 CHANGED = GAILRun(
     env_id="Ant-v5",
+    env_kwargs=("ctrl_cost_weight=1",),
     demos="irl/ant/expert-v0",
     demo_episodes=2,
     demo_rate=20,
