@@ -100,8 +100,8 @@ class SACConfig:
     def __post_init__(self) -> None:
         check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "buffer_size")
         check_at_least(self, 1, "target_update_interval", "n_critics")
-        _number_or_auto("ent_coef", self.ent_coef.removeprefix("auto_"), above=0.0)
-        _number_or_auto("target_entropy", self.target_entropy)
+        _check_number_or_auto("ent_coef", self.ent_coef, self.ent_coef.removeprefix("auto_"), 0.0)
+        _check_number_or_auto("target_entropy", self.target_entropy, self.target_entropy, -math.inf)
         check_at_least(self, 0, "learning_starts", "lr", "tau", "updates_per_step")
         check_at_least(self, 0, "quantiles", "dropped_quantiles")
         if self.quantiles and self.dropped_quantiles >= self.quantiles:
@@ -327,12 +327,12 @@ class SACLearner:
         self.venv.close()
 
 
-def _number_or_auto(name: str, given: str, above: float = -math.inf) -> None:
+def _check_number_or_auto(name: str, given: str, number: str, above: float) -> None:
     with contextlib.suppress(ValueError):
-        if given == "auto" or above < float(given) < math.inf:
+        if given == "auto" or above < float(number) < math.inf:
             return
-    also = ", auto_0.1" if above == 0.0 else ""
-    raise ValueError(f"{name} must be auto{also} or a number, e.g. {name} 0.2, not {given!r}")
+    words = "auto, auto_0.1 or a number above 0" if above == 0.0 else "auto or a number"
+    raise ValueError(f"{name} must be {words}, not {given!r}")
 
 
 def _as_sb3(given: str) -> str | float:

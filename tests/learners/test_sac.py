@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 import torch
 from torch import Tensor
 
 from irl.core import state
+from irl.core.flat import linear_layers
 from irl.core.log import Logs
 from irl.core.nets import NO_CLIP, Normaliser, fitted_normaliser
 from irl.core.types import Transitions
@@ -123,8 +126,70 @@ def test_without_a_normaliser_nothing_is_cut_and_with_one_it_is_cut_at_its_bound
     ours.close()
 
 
-def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(tmp_path: Path) -> None:
+def trained(**changes: Any) -> SACLearner:
+    ours = learner(config=replace(SMALL, **changes))
+    ours.start(HandWritten())
+    for _ in range(3):
+        ours.collect()
+    return ours
+
+
+def test_a_temperature_stays_where_it_was_put_or_is_learned_from_there() -> None:
+    fixed, low, entropic = trained(ent_coef="0.2"), trained(ent_coef="auto_0.1"), trained(target_entropy="5")
+    assert fixed.improve(HandWritten())["sac/ent_coef"] == pytest.approx(0.2)
+    learned = low.improve(HandWritten())["sac/ent_coef"]
+    assert learned == pytest.approx(0.1, rel=0.2)
+    assert learned != pytest.approx(0.1, rel=1e-4)
+    # more entropy than two actions within +-1 can have, log 4: the temperature can only rise
+    assert entropic.improve(HandWritten())["sac/ent_coef"] > 1.0
+
+
+def test_target_critics_follow_at_every_third_update_only() -> None:
+    ours = learner(config=replace(SMALL, target_update_interval=3))
+    ours.start(HandWritten())
+    ours.collect()
+    moved = []
+    for _ in range(6):
+        before = ours.model.critic_target.state_dict()["qf0.0.weight"].clone()
+        ours._learn()
+        moved.append(not torch.equal(ours.model.critic_target.state_dict()["qf0.0.weight"], before))
+    assert moved == [False, False, True] * 2
+
+
+def test_more_critics_and_their_quantiles_are_outputs_of_the_models_own() -> None:
+    ours = trained(n_critics=3, quantiles=7, dropped_quantiles=1)
+    critic, target = ours.model.critic, ours.model.critic_target
+    assert [linear_layers(net)[-1].out_features for net in critic.q_networks] == [7, 7, 7]
+    fresh = learner(config=replace(SMALL, n_critics=3, quantiles=7, dropped_quantiles=1)).model
+    for name, weight in fresh.critic.state_dict().items():
+        # the targets began as copies, and all of them were trained
+        assert torch.equal(fresh.critic_target.state_dict()[name], weight)
+        assert not torch.equal(critic.state_dict()[name], weight) or "normaliser" in name
+        assert not torch.equal(target.state_dict()[name], weight) or "normaliser" in name
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"ent_coef": "auto_auto"}, "ent_coef must be auto, auto_0.1 or a number above 0, not 'auto_auto'"),
+        ({"ent_coef": "0"}, "ent_coef must be"),
+        ({"target_entropy": "nan"}, "target_entropy must be auto or a number, not 'nan'"),
+        ({"target_update_interval": 0}, "target_update_interval must be at least 1"),
+        ({"quantiles": 2}, r"dropped_quantiles must be below quantiles \(2\), not 2"),
+        ({"n_envs": 3}, "steps_per_round must be a multiple"),
+    ],
+)
+def test_settings_that_contradict_are_refused(setting: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        SACConfig(**setting)
+
+
+@pytest.mark.parametrize("more", [{}, {"quantiles": 5, "target_update_interval": 3, "ent_coef": "0.1"}])
+def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(
+    tmp_path: Path, more: dict[str, Any]
+) -> None:
     config = replace(SMALL, lr_schedule="linear", average=0.5, products="bfloat16", updates_per_step=0.7)
+    config = replace(config, **more)
     straight = learner(config=config)
     straight.start(HandWritten())
     for round_ in range(5):
