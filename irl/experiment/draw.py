@@ -9,7 +9,9 @@ from irl.core import files
 from irl.core.errors import UserError
 from irl.core.records import RunFolder
 from irl.demos.load import Demos, check_task, load_demos
+from irl.envs.flatten import OBS_KEYS
 from irl.envs.make import check_module, make
+from irl.envs.names import split_name
 from irl.experiment.build import check_learner
 from irl.experiment.configs import Imitation
 from irl.experiment.judge import finite
@@ -30,7 +32,7 @@ def _drawn_of(config: Imitation, root: Path | None) -> Demos:
     """The demonstrations, once they are known to be of the task and the task is known to start."""
     env = make(config.env_id)
     try:
-        demos = load_demos(config.demos, episodes=config.demo_episodes, seed=config.seed, root=root)
+        demos = _loaded(config, root)
         check_learner(config.learner.KIND, env)
         check_task(demos, env, seen=config.discriminator.inputs == "obs_action")
         env.reset(seed=config.seed)
@@ -41,6 +43,18 @@ def _drawn_of(config: Imitation, root: Path | None) -> Demos:
         return demos
     finally:
         env.close()
+
+
+def _loaded(config: Imitation, root: Path | None) -> Demos:
+    given = {"episodes": config.demo_episodes, "seed": config.seed, "root": root}
+    try:
+        return load_demos(config.demos, **given)
+    except UserError:
+        keys = split_name(config.env_id)[1].get(OBS_KEYS)
+        if not keys:
+            raise
+        # observations in a dictionary, of which the task's name says the parts
+        return load_demos(config.demos, obs_keys=keys, **given)
 
 
 def drawn(demos: Demos) -> dict[str, Any]:

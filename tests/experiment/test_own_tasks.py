@@ -9,6 +9,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.spaces import Box, Dict, Discrete
 from stable_baselines3 import PPO
 
 from irl.core.records import open_run
@@ -19,6 +21,7 @@ from irl.rewards.artefact import load_reward
 from irl.rewards.wrapper import RewardWrapper
 from tests import pointmass
 from tests.demos.files import flat, write_npz
+from tests.demos.test_minari import buffer, written
 from tests.experiment.conftest import QUICK, TASK
 
 Command = Callable[..., None]
@@ -173,3 +176,31 @@ def test_demonstrations_without_actions(inputs: str, irl: Command, capfd: pytest
     reward = load_reward(Path("run"))
     assert (reward.spec.net.sees, reward.spec.net.action_dim) == (inputs, 2)
     irl("train", "--resume", "run")
+
+
+class InParts(gym.ObservationWrapper):
+    """The point mass with its place in a dictionary, beside a number that is no observation."""
+
+    def __init__(self) -> None:
+        super().__init__(gym.make(TASK))
+        self.observation_space = Dict({"place": Box(-1.5, 1.5, (2,), np.float64), "mode": Discrete(2)})
+
+    def observation(self, observation: np.ndarray) -> dict:
+        return {"place": observation, "mode": 0}
+
+
+def test_parts_of_observations_in_a_dictionary_are_learned_from(
+    irl: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = EnvSpec("InParts-v0", lambda **_: InParts(), disable_env_checker=True)
+    monkeypatch.setitem(gym.registry, "InParts-v0", spec)
+    buffers = [
+        buffer(None, {"place": e.obs, "mode": np.zeros(len(e.obs), np.int64)}, e.action)
+        for e in pointmass.demonstrations(3)
+    ]
+    spaces = {"observation_space": InParts().observation_space, "action_space": Box(-1, 1, (2,))}
+    written(Path("ds").resolve(), "parts-v0", buffers, "hdf5", **spaces)
+    words = ("--demos", "parts-v0", "--datasets-root", "ds", "--demo-episodes=2", "--out", "run", *QUICK)
+    irl("train", "gail", "--env-id", "InParts-v0", "--env-kwargs", '{"obs_keys": ["place"]}', *words)
+    irl("evaluate", "run", "--episodes", 2)
+    assert load_reward(Path("run")).spec.net.obs_dim == 2
