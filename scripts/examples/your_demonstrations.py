@@ -1,6 +1,6 @@
 """From a file of your own demonstrations to a policy, a reward and a page that judges both.
 
-    python scripts/examples/your_demonstrations.py --folder /tmp/example
+    python scripts/examples/your_demonstrations.py --folder example
 
 The demonstrations are made here by a controller of one line, because somebody must; from then on it is what
 you would type. The same as commands:
