@@ -15,7 +15,8 @@ from irl.demos.load import Demos, load_demos
 from irl.envs.rollouts import rollout, rollouts
 from irl.policies.policy import Policy, load_policy
 from irl.policies.shelf import find as load_expert
-from irl.rewards.artefact import LearnedReward, load_reward
+from irl.rewards.artefact import load_reward
+from irl.rewards.learned import LearnedReward
 from irl.rewards.wrapper import RewardWrapper
 
 if TYPE_CHECKING:

@@ -104,7 +104,7 @@ class AIRL:
         """
         c = self.config = config
         self.rng, self.gamma, self._log_pi = rng, gamma, log_pi
-        shape = (c.hidden, c.potential_hidden, c.activation, c.inputs, c.scale)
+        shape = (c.hidden, c.potential_hidden, c.activation, c.inputs, c.scale, c.log_pi_bound)
         self.net = ShapedNet(ShapedSpec(obs_dim, action_dim, *shape), normaliser, init_rng).to(rng.device)
         self._slopes = ShapedSlopes(self.net, gamma)
         self.optimizer = torch.optim.Adam(self._slopes.trained, lr=c.lr, fused=True)

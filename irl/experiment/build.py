@@ -30,7 +30,7 @@ from irl.experiment.configs import (
 )
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig, SACLearner
-from irl.rewards.artefact import LearnedReward
+from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
 
 
@@ -125,9 +125,9 @@ def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
     Terminations lead into the absorbing state if the reward knows one: SAC puts it into its memory, for PPO
     the reward adds what it pays.
     """
-    net = copy.deepcopy(reward.net).to(config.device)
-    learner = _learner(config, copy.deepcopy(reward.net.normaliser), net.spec.absorbing_scale)
-    return Forward(learner, LearnedReward(reward.spec, net))
+    scale = reward.spec.net.absorbing_scale
+    learner = _learner(config, copy.deepcopy(reward.net.normaliser), scale)
+    return Forward(learner, reward.to(config.device))
 
 
 def _learner(

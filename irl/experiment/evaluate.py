@@ -28,7 +28,8 @@ from irl.policies.card import normalised_score, summary
 from irl.policies.policy import Policy, check_policy, load_policy
 from irl.report.html import write_report
 from irl.report.tables import evaluation_table
-from irl.rewards.artefact import LearnedReward, load_reward
+from irl.rewards.artefact import load_reward
+from irl.rewards.learned import LearnedReward
 
 NO_RETURN = "the task's own reward is not a finite number"
 

@@ -11,11 +11,13 @@ from irl.core.differences import without
 from irl.core.errors import UserError
 from irl.core.records import RunFolder, open_run
 from irl.envs.make import make
+from irl.envs.names import split_name
 from irl.experiment.build import check_learner
 from irl.experiment.configs import RetrainRun
 from irl.experiment.snapshots import snapshot_of
-from irl.rewards.artefact import WEIGHTS, LearnedReward, load_reward
-from irl.rewards.shaped import PARTS
+from irl.rewards.artefact import WEIGHTS, load_reward
+from irl.rewards.learned import LearnedReward
+from irl.rewards.shaped import ENTROPIC, PARTS
 
 RECORD = "reward.json"
 """Says in the run folder which reward it is."""
@@ -32,7 +34,9 @@ def frozen(config: RetrainRun, snapshot: Path, part: str | None = None) -> Learn
     try:
         takes = reward.spec.net.obs_dim, reward.spec.net.action_dim
         needs = _size(env.observation_space), _size(box := env.action_space)
-        if reward.spec.env_id != config.env_id or takes != needs:
+        # the same task under other dynamics is what a reward may be taken to
+        same = split_name(reward.spec.env_id)[0] == split_name(config.env_id)[0]
+        if not same or takes != needs:
             raise UserError(
                 f"the reward in {place} is of {reward.spec.env_id} with observations of {takes[0]} and "
                 f"actions of {takes[1]}; {config.env_id} has {needs[0]} and {needs[1]}: choose the run it "
@@ -75,7 +79,7 @@ def frozen_again(config: RetrainRun, folder: RunFolder) -> LearnedReward:
     _, snapshot = snapshot_of(open_run(config.run), config.snapshot)
     before = files.read_json(record := folder.path / RECORD)
     paid = before.get("reward_map") if isinstance(before, dict) else None
-    reward = frozen(config, snapshot, paid if paid in PARTS else None)
+    reward = frozen(config, snapshot, paid if paid in (*PARTS, ENTROPIC) else None)
     now = recorded(config, reward, snapshot)
     # a run may be renamed
     if not isinstance(before, dict) or without(before, ("run",)) != without(now, ("run",)):

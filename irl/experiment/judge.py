@@ -13,7 +13,7 @@ from irl.core import statistics
 from irl.core.rng import stream
 from irl.diagnostics.agreement import per_episode, per_step
 from irl.diagnostics.drift import split
-from irl.rewards.artefact import LearnedReward
+from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
 
 SCATTER = 3000

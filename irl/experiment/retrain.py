@@ -18,8 +18,10 @@ from irl.core.config import MOST_SEED, check_at_least, check_seed, check_threads
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
 from irl.envs.make import check_module
+from irl.envs.names import full_name
+from irl.envs.tasks import task_name
 from irl.experiment import build
-from irl.experiment.configs import OFF_POLICY, Imitation, RetrainRun, Watch
+from irl.experiment.configs import OFF_POLICY, Imitation, RetrainRun, Watch, Words
 from irl.experiment.frozen import RECORD, frozen, frozen_again, recorded
 from irl.experiment.play import Player
 from irl.experiment.retrained import report
@@ -42,8 +44,12 @@ class Retrain:
     """Run folder of `irl retrain` to go on with, by its own settings; no other is needed."""
     snapshot: int | None = None
     """Step of the snapshot; the last one unless given."""
-    part: Literal["g", "f"] | None = None
-    """Of AIRL's reward: g, what a step is worth, or f, the same shaped by h; g unless given."""
+    part: Literal["g", "f", "f-log-pi"] | None = None
+    """Of AIRL's reward: g, what a step is worth; f, the same shaped by h; f-log-pi, which the run's learner
+    may have been paid, with the snapshot's own policy. g unless given."""
+    env_kwargs: Words = ()
+    """Retrain where the task is another: what the environment is given beside what the run's was, name=value
+    or a JSON object. Observations and actions must be of the same sizes."""
     algo: Literal["ppo", "sac"] | None = None
     """Which learner; the run's own unless given."""
     steps: int | None = None
@@ -51,7 +57,8 @@ class Retrain:
     seed: int | None = None
     """Seed of everything random; the run's + 1000 unless given."""
     out: Path | None = None
-    """Run folder; runs/retrain-<run>-<step>[-<part>]-<algo>-s<seed> unless given."""
+    """Run folder; runs/retrain-<run>-<step>[-<part>][-<task>]-<algo>-s<seed> unless given; the task where it
+    is not the run's."""
     policies_root: Path | None = None
     """Where the shelf is, whose card gives the score; expert_data/policies unless given."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
@@ -124,11 +131,13 @@ def _settled(command: Retrain, its: Any, step: int) -> RetrainRun:
             raise UserError(f"--{name}.* are settings of a learner that is not used; choose --algo {name}")
     seed = (its.seed + SEED_APART) % (MOST_SEED + 1) if command.seed is None else command.seed
     source = command.run.resolve()
+    env_id = full_name(its.env_id, command.env_kwargs)
     of = f"-{command.part}" if command.part else ""
+    of += f"-{task_name(env_id)}" if env_id != its.env_id else ""
     return RetrainRun(
         run=source,
         snapshot=step,
-        env_id=its.env_id,
+        env_id=env_id,
         steps=its.steps if command.steps is None else command.steps,
         seed=seed,
         out=command.out or Path("runs") / f"retrain-{source.name}-{step}{of}-{algo}-s{seed}",

@@ -23,7 +23,7 @@ from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 from irl.policies.card import Card, normalised_score, summary
 from irl.policies.policy import load_policy
-from irl.rewards.artefact import LearnedReward
+from irl.rewards.learned import LearnedReward
 
 EPISODES = 20
 """Episodes of the deterministic policy, whose starts no training and no other evaluation has."""

@@ -21,7 +21,8 @@ from irl.experiment.configs import ExpertRun, Imitation, RetrainRun
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
 from irl.policies.policy import save_policy
-from irl.rewards.artefact import RewardSpec, save_reward
+from irl.rewards.artefact import save_reward
+from irl.rewards.learned import RewardSpec
 from irl.rewards.nets import SEES
 
 

@@ -30,13 +30,13 @@ from irl.core.finite import check_finite, named
 from irl.core.nets import ACTIVATIONS, Normaliser
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.envs.discrete import OneHot
-from irl.learners import densities
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
 from irl.learners.ppo_update import PPOUpdate, SB3Update
 from irl.learners.random_state import read_global, write_global
 from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
+from irl.policies import densities
 from irl.policies.policy import Policy, PolicySpec
 from irl.rewards.normalise import ReturnScale
 
@@ -203,7 +203,7 @@ class PPOLearner:
     def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:
         """Log density of the batch's own actions, as the environment saw them, under the current policy.
 
-        `irl.learners.densities.clipped`; no normaliser moves and nothing is drawn.
+        `irl.policies.densities.clipped`; no normaliser moves and nothing is drawn.
         """
         policy, box = self.model.policy, self.venv.action_space
         assert isinstance(box, Box)

@@ -35,7 +35,6 @@ from irl.core.finite import check_finite, named
 from irl.core.nets import CLIP, NO_CLIP, Normaliser, linear
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, RewardFn, Transitions
-from irl.learners import densities
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures, Spaces, widened
 from irl.learners.heads import Lowest, Quantiles
@@ -43,6 +42,7 @@ from irl.learners.replay import Replay
 from irl.learners.sac_update import SACUpdate
 from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
+from irl.policies import densities
 from irl.policies.policy import Policy, PolicySpec
 
 
@@ -266,7 +266,7 @@ class SACLearner:
     def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:
         """Log density of the batch's own actions, in environment units, under the current policy.
 
-        `irl.learners.densities.squashed`; no normaliser moves and nothing is drawn.
+        `irl.policies.densities.squashed`; no normaliser moves and nothing is drawn.
         """
         features = self._update.features(batch.obs, batch.absorbing)
         half = torch.as_tensor((self._high - self._low) / 2, device=batch.obs.device)

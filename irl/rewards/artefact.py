@@ -1,23 +1,24 @@
 """A learned reward as files: `spec.json` says what it is, `weights.safetensors` holds the numbers.
 
     logit:   r(s, a) = map(logit(s, a)),   logit(s, a) = mlp([clip((s - mean) / std, +-10), a])
-    shaped:  r = g(s, a), or f(s, a, s') = g(s, a) + gamma h(s') - h(s), as its reader asks
+    shaped:  r = g(s, a), or f(s, a, s') = g(s, a) + gamma h(s') - h(s), as its reader asks,
+             or f - log pi(a|s), pi the policy that a snapshot has beside it
 
 It takes task observations and environment-unit actions, and gives the reward before any scaling that a
 learner did (`reward_scale` in the specification records that). One that knows the absorbing state adds the
 indicator itself, and what that state pays at a termination (`irl.rewards.tail`). No pickle is read.
 
-Version 1 had no absorbing state and no spectral norm, version 2 logits of (s, a) only; they are read as such.
+Version 1 had no absorbing state and no spectral norm, version 2 logits of (s, a) only, version 3 no bound of
+log pi; they are read as such.
 """
 
 import itertools
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import torch
-from jaxtyping import Float
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
@@ -26,77 +27,24 @@ from irl.core import files
 from irl.core.config import from_json, to_json
 from irl.core.errors import UserError
 from irl.core.nets import Normaliser
-from irl.core.types import Transitions
-from irl.rewards import tail
+from irl.policies.density import Density
+from irl.policies.policy import load_policy
+from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.maps import MAPS
 from irl.rewards.nets import LogitNet, LogitSpec
-from irl.rewards.shaped import PARTS, ShapedNet, ShapedSpec
+from irl.rewards.shaped import ENTROPIC, PARTS, ShapedNet, ShapedSpec
 
-FORMAT, VERSION = "irl.reward", 3
+FORMAT, VERSION = "irl.reward", 4
 READABLE = [(FORMAT, version) for version in range(1, VERSION + 1)]
 SPEC, WEIGHTS = "spec.json", "weights.safetensors"
 ADDED_IN_2 = {"absorbing_scale": 0.0, "spectral_norm": False}
 """Settings of the network that version 1 did not have."""
 ADDED_IN_3 = {"sees": "obs_action"}
 """Settings that version 2 did not have."""
-
-
-@dataclass(frozen=True)
-class RewardSpec:
-    """What a saved reward is and where it comes from."""
-
-    env_id: str
-    method: str
-    reward_map: str
-    """Of a logit, a name in `irl.rewards.maps.MAPS`; of g and h, a name in `irl.rewards.shaped.PARTS`."""
-    inputs: str
-    """What the network sees, in words: `obs, action`."""
-    net: LogitSpec | ShapedSpec
-    gamma: float
-    """The discount of the learner it was learned beside, and of what the absorbing state pays."""
-    reward_scale: float
-    """What that learner divided it by at this step."""
-    env_steps: int
-    provenance: dict[str, Any]
-
-
-class LearnedReward:
-    """A frozen reward: call it with a batch of transitions."""
-
-    def __init__(self, spec: RewardSpec, net: LogitNet | ShapedNet) -> None:
-        self.spec, self.net = spec, net.eval().requires_grad_(False)
-
-    def __repr__(self) -> str:
-        s = self.spec
-        of = f"logit({s.inputs})" if isinstance(self.net, LogitNet) else s.inputs
-        return f"LearnedReward({s.method} on {s.env_id}, {s.reward_map}({of}), {s.env_steps} steps)"
-
-    def logits(self, batch: Transitions) -> Float[Tensor, "B"]:
-        """High where the expert is likelier than the policy of that time.
-
-        Of g and h it is f: AIRL's logit before the log pi of that policy, which is not saved, is taken off.
-
-        Raises:
-            ValueError: the batch is of another task.
-        """
-        self._check(batch)
-        return self.net(batch) if isinstance(self.net, LogitNet) else self.net.f(batch, self.spec.gamma)
-
-    def __call__(self, batch: Transitions) -> Float[Tensor, "B"]:
-        """The reward of each step; high is good. At a termination, with what the absorbing state pays."""
-        self._check(batch)
-        if isinstance(self.net, ShapedNet):
-            return self.net.paid(self.spec.reward_map, batch, self.spec.gamma)
-        return tail.reward(self.net, self.spec.reward_map, batch, self.spec.gamma)
-
-    def _check(self, batch: Transitions) -> None:
-        given, expected = (batch.obs.shape[1], batch.action.shape[1]), self.spec.net
-        blind = expected.sees != "obs_action"
-        if given[0] != expected.obs_dim or (given[1] != expected.action_dim and not blind):
-            raise ValueError(
-                f"the reward of {self.spec.env_id} takes observations of {expected.obs_dim} and actions of "
-                f"{expected.action_dim}, the batch has {given[0]} and {given[1]}"
-            )
+ADDED_IN_4 = {"log_pi_bound": 10.0}
+"""Settings that version 3 did not have, of g and h."""
+POLICY = "policy.safetensors"
+"""Of a snapshot, beside the folder of its reward."""
 
 
 def save_reward(folder: Path, spec: RewardSpec, net: LogitNet | ShapedNet) -> None:
@@ -112,7 +60,9 @@ def load_reward(path: Path | str, part: str | None = None) -> LearnedReward:
     """The reward in a folder: a reward's own, a snapshot's, or a run's (its last snapshot).
 
     Args:
-        part: of AIRL's g and f, which one; g unless given. Other rewards have no parts.
+        part: of AIRL's g and f, which one, or f-log-pi of a snapshot; g unless given. Other rewards have
+            no parts.
+
     Raises:
         UserError: there is none, it is of a newer format, its weights do not fit its specification, or it
             has no such part.
@@ -127,12 +77,29 @@ def load_reward(path: Path | str, part: str | None = None) -> LearnedReward:
         net.load_state_dict(weights)
     except (OSError, SafetensorError, KeyError, TypeError, ValueError, RuntimeError) as error:
         raise UserError(f"{folder} is not a reward this version reads: {json.dumps(str(error))}") from error
-    if part is not None:
-        if part not in (known := _payable(spec.net) if isinstance(net, ShapedNet) else ()):
-            has = f"choose one of {', '.join(known)}" if known else "only AIRL's rewards have; leave it out"
-            raise UserError(f"the reward of {spec.method} in {folder} has no part {part!r:.40}; {has}")
-        spec = replace(spec, reward_map=part)
-    return LearnedReward(spec, net)
+    if part is None:
+        return LearnedReward(spec, net)
+    if part not in (known := (*PARTS, ENTROPIC) if isinstance(net, ShapedNet) else ()):
+        has = f"choose one of {', '.join(known)}" if known else "only AIRL's rewards have; leave it out"
+        raise UserError(f"the reward of {spec.method} in {folder} has no part {part!r:.40}; {has}")
+    return LearnedReward(replace(spec, reward_map=part), net, _density(folder) if part == ENTROPIC else None)
+
+
+def _density(folder: Path) -> Density:
+    """Of the policy of the same snapshot.
+
+    Raises:
+        UserError: there is none, or it makes a choice of actions.
+    """
+    if not (file := folder.parent / POLICY).is_file():
+        raise UserError(
+            f"{ENTROPIC} needs the policy that {folder} was learned beside, and {file} is not there; "
+            f"choose one of {', '.join(PARTS)}"
+        )
+    try:
+        return Density(load_policy(file))
+    except ValueError as error:
+        raise UserError(f"{file} cannot be used for {ENTROPIC}: {error}") from error
 
 
 def _specification(folder: Path, content: Any) -> RewardSpec:
@@ -148,8 +115,11 @@ def _specification(folder: Path, content: Any) -> RewardSpec:
     if (digest := files.sha256(folder / WEIGHTS)) != (named := content.pop("weights_sha256")):
         raise ValueError(f"{WEIGHTS} has sha256 {digest[:12]}, {SPEC} says {named!r:.14}")
     if version < VERSION and isinstance(content.get("net"), dict):
-        added = ADDED_IN_3 | (ADDED_IN_2 if version == 1 else {})
-        content["net"] = added | content["net"] | {"kind": LogitSpec.KIND}
+        if version == 3 and content["net"].get("kind") == ShapedSpec.KIND:
+            content["net"] = ADDED_IN_4 | content["net"]
+        elif version < 3:
+            added = ADDED_IN_3 | (ADDED_IN_2 if version == 1 else {})
+            content["net"] = added | content["net"] | {"kind": LogitSpec.KIND}
     spec = from_json(RewardSpec, content, SPEC)
     if spec.reward_map not in (known := _payable(spec.net)):
         raise ValueError(f"unknown map {spec.reward_map!r}; known: {', '.join(known)}")

@@ -32,6 +32,9 @@ from irl.rewards import tail
 PARTS = ("g", "f")
 """What can be asked of a shaped reward."""
 
+ENTROPIC = "f-log-pi"
+"""And of one whose policy is beside it: f less the log density of the policy of that time."""
+
 
 @dataclass(frozen=True)
 class ShapedSpec:
@@ -49,9 +52,11 @@ class ShapedSpec:
     """What g sees."""
     absorbing_scale: float = 0.0
     """What the indicator of s_abs is multiplied by; 0: the networks know no s_abs."""
+    log_pi_bound: float = 10.0
+    """Beside which log pi it was learned: one kept within this of 0."""
 
     def __post_init__(self) -> None:
-        check_at_least(self, 0, "absorbing_scale")
+        check_at_least(self, 0, "absorbing_scale", "log_pi_bound")
 
     @property
     def state(self) -> int:

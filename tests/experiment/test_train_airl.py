@@ -72,7 +72,7 @@ def test_a_policy_is_retrained_on_each_part_and_goes_on_with_the_one_it_was_begu
 ) -> None:
     learn("airl", "run")
     small = ("--ppo.n-envs=2", "--ppo.steps-per-round=128", "--ppo.batch-size=64", "--steps=256")
-    for part in ("g", "f"):
+    for part in ("g", "f", "f-log-pi"):
         irl("retrain", "run", "--part", part, *small, "--watch.no-progress")
         folder = Path(f"runs/retrain-run-768-{part}-ppo-s1000")
         assert files.read_json(folder / "retrain.json")["reward"]["reward_map"] == part
@@ -82,6 +82,26 @@ def test_a_policy_is_retrained_on_each_part_and_goes_on_with_the_one_it_was_begu
     with pytest.raises(SystemExit):
         irl("retrain", "gail", "--part=f", *small)
     assert "only AIRL's rewards have; leave it out" in capfd.readouterr().err
+
+
+def test_a_reward_is_taken_to_the_task_under_other_dynamics_and_to_no_other_task(
+    learn: Train, irl: Command, capfd: pytest.CaptureFixture
+) -> None:
+    learn("airl", "run")
+    small = ("--ppo.n-envs=2", "--ppo.steps-per-round=128", "--ppo.batch-size=64", "--steps=256")
+    irl("retrain", "run", "--env-kwargs", "cliff=0.95", "--out", "there", *small, "--watch.no-progress")
+    result = files.read_json(Path("there/retrain.json"))
+    assert result["env_id"] == 'PointMass-v0?{"cliff":0.95}'
+    assert min(result["true"]["lengths"]) < pointmass.STEPS  # it ends early there
+    irl("retrain", "--resume", "there")
+    with pytest.raises(SystemExit):
+        irl("retrain", "run", "--env-kwargs", "height=2", "--out", "nowhere", *small)
+    assert "height" in capfd.readouterr().err
+    config = files.read_json(Path("there/config.json"))
+    files.write_json(Path("there/config.json"), config | {"env_id": "Cliff-v0"})
+    with pytest.raises(SystemExit):
+        irl("retrain", "--resume", "there")
+    assert "is of PointMass-v0" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from irl.core.nets import fitted_normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Transitions, concatenate
 from irl.learners.reward_vec import RewardVecWrapper
-from irl.rewards.artefact import LearnedReward, RewardSpec
+from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.nets import LogitNet, LogitSpec
 from irl.rewards.wrapper import RewardWrapper
 from tests import pointmass

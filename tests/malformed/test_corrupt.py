@@ -32,7 +32,8 @@ from irl.report.header import header
 from irl.report.header import settings as report_settings
 from irl.report.html import render
 from irl.report.tables import evaluation_table
-from irl.rewards.artefact import LearnedReward, load_reward
+from irl.rewards.artefact import load_reward
+from irl.rewards.learned import LearnedReward
 from tests.experiment.conftest import DATASET, TASK
 from tests.malformed.corruption import bytes_changed, json_changed
 from tests.malformed.damage import foreign

@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file
@@ -11,7 +13,10 @@ from irl.core.errors import UserError
 from irl.core.nets import fitted_normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Transitions
-from irl.rewards.artefact import WEIGHTS, RewardSpec, load_reward, save_reward
+from irl.policies.density import Density
+from irl.policies.policy import Policy, PolicySpec, save_policy
+from irl.rewards.artefact import WEIGHTS, load_reward, save_reward
+from irl.rewards.learned import RewardSpec
 from irl.rewards.shaped import ShapedNet, ShapedSpec
 from tests.rewards.test_artefact import REWARD, a_net, batch, edit, set_weights
 
@@ -63,9 +68,52 @@ def test_a_state_only_reward_comes_back_to_the_bit(tmp_path: Path) -> None:
         assert torch.equal(load_reward(tmp_path)(steps()), net.g(steps()))
 
 
+def test_a_reward_of_version_3_is_read_as_it_was(folder: Path) -> None:
+    def as_it_was(content: dict[str, Any]) -> None:
+        content["version"] = 3
+        del content["net"]["log_pi_bound"]
+
+    now = load_reward(folder)
+    edit(folder, as_it_was)
+    assert load_reward(folder).spec == now.spec
+
+
+def a_policy(distribution: str = "gaussian") -> Policy:
+    rng = np.random.default_rng(0)
+    weights = {"obs_mean": np.zeros(3), "obs_std": np.full(3, 0.7), "log_std": np.array([-0.5, 0.2])}
+    weights |= {"action_low": -np.ones(2), "action_high": np.ones(2)}
+    weights |= {"layers.0.weight": rng.normal(size=(2, 3)), "layers.0.bias": rng.normal(size=2)}
+    if distribution == "categorical":
+        del weights["log_std"]
+    return Policy(PolicySpec("Task-v0", 3, 2, (), "tanh", distribution), weights)
+
+
+def test_f_less_the_log_density_of_the_policy_beside_it(folder: Path) -> None:
+    save_policy(policy := a_policy(), folder.parent / "policy.safetensors")
+    reward, f, log_pi = load_reward(folder, "f-log-pi"), load_reward(folder, "f"), Density(policy)
+    assert reward.spec.reward_map == "f-log-pi"
+    edit(folder, lambda c: c["net"].update(log_pi_bound=2.0))
+    near = load_reward(folder, "f-log-pi")
+    of_policy = log_pi(steps())
+    assert of_policy.min() < -2.0
+    torch.testing.assert_close(reward(steps()), f(steps()) - of_policy.clamp(-10, 10))
+    torch.testing.assert_close(near(steps()), f(steps()) - of_policy.clamp(-2, 2))
+    assert torch.equal(near.to("cpu")(steps()), near(steps()))
+    resting = replace(steps(), terminated=steps().terminated & False, absorbing=torch.ones(20).bool())
+    assert torch.equal(reward(resting), f(resting))
+
+
+def test_without_its_policy_there_is_no_f_less_log_pi(folder: Path) -> None:
+    with pytest.raises(UserError, match=r"policy\.safetensors is not there; choose one of g, f"):
+        load_reward(folder, "f-log-pi")
+    save_policy(a_policy("categorical"), folder.parent / "policy.safetensors")
+    with pytest.raises(UserError, match="has no density"):
+        load_reward(folder, "f-log-pi")
+
+
 @pytest.mark.parametrize("part", ["h", "logit", "", "f - log pi"])
 def test_a_part_that_there_is_not_is_refused(folder: Path, part: str) -> None:
-    with pytest.raises(UserError, match=r"airl in .* has no part .*; choose one of g, f") as caught:
+    with pytest.raises(UserError, match=r"airl in .* has no part .*; choose one of g, f, f-log-pi") as caught:
         load_reward(folder, part)
     assert "\n" not in str(caught.value)
 
@@ -80,7 +128,7 @@ def test_another_methods_reward_has_no_parts(tmp_path: Path) -> None:
     ("change", "message"),
     [
         (lambda c: c.update(reward_map="gail"), "unknown map 'gail'; known: g, f"),
-        (lambda c: c.update(version=2), "unknown inputs, potential_hidden"),
+        (lambda c: c.update(version=2), "unknown inputs, log_pi_bound, potential_hidden"),
         (lambda c: c["net"].update(inputs="all"), "spec.json.net.inputs: expected 'obs', 'obs_action'"),
         (lambda c: c["net"].update(inputs="obs"), "size mismatch"),
         (lambda c: c["net"].update(potential_hidden=[7]), "size mismatch"),
@@ -88,7 +136,7 @@ def test_another_methods_reward_has_no_parts(tmp_path: Path) -> None:
         (lambda c: c["net"].update(obs_dim=-2), "do not fit"),
         (lambda c: c["net"].update(absorbing_scale=0.0), "size mismatch"),
         (lambda c: c["net"].update(activation="gelu"), "gelu"),
-        (lambda c: c["net"].update(kind="logit"), "unknown inputs, potential_hidden"),
+        (lambda c: c["net"].update(kind="logit"), "unknown inputs, log_pi_bound, potential_hidden"),
         (lambda c: c["net"].pop("potential_hidden"), "missing potential_hidden"),
     ],
 )

@@ -13,7 +13,7 @@ from irl.core.rng import torch_stream
 from irl.core.types import RewardFn, Transitions, from_episodes
 from irl.envs.make import make
 from irl.envs.rollouts import random_act, rollouts
-from irl.rewards.artefact import LearnedReward, RewardSpec
+from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.nets import LogitNet, LogitSpec
 from irl.rewards.wrapper import RewardWrapper
 from tests import pointmass

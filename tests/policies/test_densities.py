@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from torch import Tensor
 
 from irl.core.types import Transitions
-from irl.learners import densities
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig, SACLearner
+from irl.policies import densities
 from tests import pointmass  # noqa: F401 (registers the tasks)
 
 LOW, HIGH = torch.tensor([-2.0]), torch.tensor([1.0])

@@ -1,0 +1,87 @@
+"""A reward that was learned and is learned no more: a function of a batch of transitions."""
+
+import copy
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from irl.core.types import Transitions
+from irl.policies.density import Density
+from irl.rewards import tail
+from irl.rewards.nets import LogitNet, LogitSpec
+from irl.rewards.shaped import ShapedNet, ShapedSpec
+
+
+@dataclass(frozen=True)
+class RewardSpec:
+    """What a saved reward is and where it comes from."""
+
+    env_id: str
+    method: str
+    reward_map: str
+    """Of a logit, a name in `irl.rewards.maps.MAPS`; of g and h, a name in `irl.rewards.shaped.PARTS`."""
+    inputs: str
+    """What the network sees, in words: `obs, action`."""
+    net: LogitSpec | ShapedSpec
+    gamma: float
+    """The discount of the learner it was learned beside, and of what the absorbing state pays."""
+    reward_scale: float
+    """What that learner divided it by at this step."""
+    env_steps: int
+    provenance: dict[str, Any]
+
+
+class LearnedReward:
+    """A frozen reward: call it with a batch of transitions."""
+
+    def __init__(self, spec: RewardSpec, net: LogitNet | ShapedNet, log_pi: Density | None = None) -> None:
+        """`log_pi` is for f - log pi, and nothing else."""
+        self.spec, self.net, self.log_pi = spec, net.eval().requires_grad_(False), log_pi
+
+    def to(self, device: str | torch.device) -> "LearnedReward":
+        """A copy there."""
+        log_pi = copy.deepcopy(self.log_pi).to(device) if self.log_pi is not None else None
+        return LearnedReward(self.spec, copy.deepcopy(self.net).to(device), log_pi)
+
+    def __repr__(self) -> str:
+        s = self.spec
+        of = f"logit({s.inputs})" if isinstance(self.net, LogitNet) else s.inputs
+        return f"LearnedReward({s.method} on {s.env_id}, {s.reward_map}({of}), {s.env_steps} steps)"
+
+    def logits(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """High where the expert is likelier than the policy of that time.
+
+        Of g and h it is f: AIRL's logit before the log pi of that policy, which is not saved, is taken off.
+
+        Raises:
+            ValueError: the batch is of another task.
+        """
+        self._check(batch)
+        return self.net(batch) if isinstance(self.net, LogitNet) else self.net.f(batch, self.spec.gamma)
+
+    def __call__(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """The reward of each step; high is good. At a termination, with what the absorbing state pays."""
+        self._check(batch)
+        if isinstance(self.net, ShapedNet):
+            if self.log_pi is None:
+                return self.net.paid(self.spec.reward_map, batch, self.spec.gamma)
+            return self.net.paid("f", batch, self.spec.gamma) - self._bounded_log_pi(self.log_pi, batch)
+        return tail.reward(self.net, self.spec.reward_map, batch, self.spec.gamma)
+
+    def _bounded_log_pi(self, log_pi: Density, batch: Transitions) -> Float[Tensor, "B"]:
+        assert isinstance(self.spec.net, ShapedSpec)
+        bound = self.spec.net.log_pi_bound
+        bounded = log_pi(batch).clamp(-bound, bound)
+        return bounded if batch.absorbing is None else bounded.masked_fill(batch.absorbing, 0.0)
+
+    def _check(self, batch: Transitions) -> None:
+        given, expected = (batch.obs.shape[1], batch.action.shape[1]), self.spec.net
+        blind = expected.sees != "obs_action"
+        if given[0] != expected.obs_dim or (given[1] != expected.action_dim and not blind):
+            raise ValueError(
+                f"the reward of {self.spec.env_id} takes observations of {expected.obs_dim} and actions of "
+                f"{expected.action_dim}, the batch has {given[0]} and {given[1]}"
+            )
