@@ -20,7 +20,10 @@ from irl.rewards.learned import LearnedReward
 from irl.rewards.wrapper import RewardWrapper
 
 if TYPE_CHECKING:
+    from irl.experiment.imitate import imitate
     from irl.learners.reward_vec import RewardVecWrapper
+
+_LAZY = {"RewardVecWrapper": "irl.learners.reward_vec", "imitate": "irl.experiment.imitate"}
 
 __all__ = [
     "Demos",
@@ -34,6 +37,7 @@ __all__ = [
     "UserError",
     "concatenate",
     "from_episodes",
+    "imitate",
     "load_demos",
     "load_expert",
     "load_policy",
@@ -44,7 +48,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # Stable-Baselines3 takes seconds to import, and only this name needs it
-    if name == "RewardVecWrapper":
-        return import_module("irl.learners.reward_vec").RewardVecWrapper
+    # Stable-Baselines3 takes seconds to import, and only these names need it
+    if name in _LAZY:
+        return getattr(import_module(_LAZY[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -17,7 +17,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
-import numpy as np
 import torch
 from gymnasium.spaces import Box, Discrete
 from jaxtyping import Float
@@ -32,11 +31,11 @@ from irl.core.types import Metrics, RewardFn, Transitions
 from irl.envs.discrete import OneHot
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
+from irl.learners.ppo_rollout import give_rewards, log_pi
 from irl.learners.ppo_update import PPOUpdate, SB3Update
 from irl.learners.random_state import read_global, write_global
 from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
-from irl.policies import densities
 from irl.policies.policy import Policy, PolicySpec
 from irl.rewards.normalise import ReturnScale
 
@@ -205,13 +204,7 @@ class PPOLearner:
 
         `irl.policies.densities.clipped`; no normaliser moves and nothing is drawn.
         """
-        policy, box = self.model.policy, self.venv.action_space
-        assert isinstance(box, Box)
-        policy.set_training_mode(False)
-        normal = policy.get_distribution(batch.obs).distribution
-        assert isinstance(normal, torch.distributions.Normal)
-        low, high = (torch.as_tensor(bound, device=batch.obs.device) for bound in (box.low, box.high))
-        return densities.clipped(batch.action, normal.mean, normal.stddev.log(), low, high)
+        return log_pi(self.model, batch)
 
     def improve(self, reward: RewardFn) -> Metrics:
         """Reward the last rollout in one batch and do PPO's gradient steps on it.
@@ -223,7 +216,7 @@ class PPOLearner:
         if self._batch is None:
             raise RuntimeError("collect a rollout before improving on it")
         batch, self._batch = self._batch, None
-        raw = self._give_rewards(batch, reward)
+        raw = give_rewards(self.model, self._scale, batch, reward)
         metrics = self._train()
         self._average.update(_actor_weights(self.model))
         if self._running:
@@ -244,27 +237,6 @@ class PPOLearner:
         metrics = self._update(model.lr_schedule(remaining), c.clip_range, c.clip_range_vf)
         check_finite(named("policy", model.policy.state_dict()))
         return metrics
-
-    @torch.no_grad()
-    def _give_rewards(self, batch: Transitions, reward: RewardFn) -> np.ndarray:
-        model, buffer = self.model, self.model.rollout_buffer
-        shape = buffer.rewards.shape
-        given = reward(batch)
-        check_finite({"reward of the rollout": given})
-        raw = given.double().cpu().numpy().reshape(shape)
-        ended = (batch.terminated | batch.truncated).cpu().numpy().reshape(shape)
-        self._scale.update(raw, ended)
-        buffer.rewards[:] = raw / self._scale.std
-        cut_off = batch.truncated & ~batch.terminated
-        if bool(cut_off.any()):
-            values = model.policy.predict_values(batch.next_obs[cut_off].to(model.device))
-            where = cut_off.cpu().numpy().reshape(shape)
-            buffer.rewards[where] += model.gamma * values.flatten().cpu().numpy()
-        assert isinstance(model._last_obs, np.ndarray)
-        assert model._last_episode_starts is not None
-        last_values = model.policy.predict_values(torch.as_tensor(model._last_obs, device=model.device))
-        buffer.compute_returns_and_advantage(last_values, model._last_episode_starts)
-        return raw
 
     def policy(self) -> Policy:
         """The current policy, exported: a copy that later updates leave alone."""

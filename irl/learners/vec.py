@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium.spaces import Discrete
-from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecEnvWrapper
 
 from irl.core.types import Transitions
 from irl.envs.discrete import OneHot
@@ -40,27 +40,21 @@ class Envs(DummyVecEnv):
         return obs, self.buf_rews.copy(), self.buf_dones.copy(), infos
 
 
-class RecordingVecEnv(VecEnvWrapper):
-    """Steps N environments and records each step until `take` is called."""
+class Recorder(VecEnvWrapper):
+    """Steps a vector of environments and records each step until `take` is called."""
 
-    def __init__(self, env_id: str, seeds: Sequence[int], env_kwargs: dict[str, Any] | None = None) -> None:
-        def builder() -> Replayable:
-            return Replayable(make(env_id, **(env_kwargs or {})))
-
-        inner = Envs([builder for _ in seeds])
+    def __init__(self, inner: VecEnv) -> None:
         self._rows = inner.action_space if isinstance(inner.action_space, OneHot) else None
         # SB3 knows choices from 0 on
         choices = Discrete(len(self._rows.low)) if self._rows is not None else None
         super().__init__(inner, action_space=choices)
-        self._first_seeds = list(seeds)
         self._steps: list[tuple[np.ndarray, ...]] = []
-        self._returns, self._lengths = np.zeros(len(seeds)), np.zeros(len(seeds), dtype=np.int64)
+        self._returns, self._lengths = np.zeros(inner.num_envs), np.zeros(inner.num_envs, dtype=np.int64)
         self.finished: list[tuple[float, int]] = []
         """Return and length of each episode that ended since the last `take_finished`."""
 
     def reset(self) -> np.ndarray:
-        """Reset every environment with its own seed."""
-        self.venv._seeds = list(self._first_seeds)
+        """Reset every environment."""
         self._obs = _flat(self.venv.reset())
         return self._obs
 
@@ -80,7 +74,7 @@ class RecordingVecEnv(VecEnvWrapper):
             info["own_reward"] = reward
         for i in np.flatnonzero(dones).tolist():
             next_obs[i] = infos[i]["terminal_observation"]
-            truncated[i] = infos[i]["TimeLimit.truncated"]
+            truncated[i] = infos[i].get("TimeLimit.truncated", False)
         terminated = dones & ~truncated
         self._steps.append((self._obs, self._actions, next_obs, terminated, truncated, rewards.copy()))
         self._count(rewards, dones)
@@ -113,6 +107,28 @@ class RecordingVecEnv(VecEnvWrapper):
         finished, self.finished = self.finished, []
         return finished
 
+    def _count(self, rewards: np.ndarray, dones: np.ndarray) -> None:
+        self._returns += rewards
+        self._lengths += 1
+        self.finished += [(float(self._returns[i]), int(self._lengths[i])) for i in np.flatnonzero(dones)]
+        self._returns[dones], self._lengths[dones] = 0.0, 0
+
+
+class RecordingVecEnv(Recorder):
+    """The same of environments that it makes, whose place can be saved."""
+
+    def __init__(self, env_id: str, seeds: Sequence[int], env_kwargs: dict[str, Any] | None = None) -> None:
+        def builder() -> Replayable:
+            return Replayable(make(env_id, **(env_kwargs or {})))
+
+        super().__init__(Envs([builder for _ in seeds]))
+        self._first_seeds = list(seeds)
+
+    def reset(self) -> np.ndarray:
+        """Reset every environment with its own seed."""
+        self.venv._seeds = list(self._first_seeds)
+        return super().reset()
+
     def state_dict(self) -> dict[str, Any]:
         """Where every environment is; read between two rollouts, when nothing is recorded."""
         positions = [env.position() for env in self._envs()]
@@ -132,12 +148,6 @@ class RecordingVecEnv(VecEnvWrapper):
         inner = self.venv
         assert isinstance(inner, DummyVecEnv)
         return inner.envs  # pyright: ignore[reportReturnType]
-
-    def _count(self, rewards: np.ndarray, dones: np.ndarray) -> None:
-        self._returns += rewards
-        self._lengths += 1
-        self.finished += [(float(self._returns[i]), int(self._lengths[i])) for i in np.flatnonzero(dones)]
-        self._returns[dones], self._lengths[dones] = 0.0, 0
 
 
 def _flat(obs: Any) -> np.ndarray:

@@ -12,6 +12,7 @@ from irl.core import state
 from irl.core.nets import fitted_normaliser
 from irl.core.types import Transitions, from_episodes
 from irl.learners.ppo import PPOConfig, PPOLearner
+from irl.learners.ppo_rollout import give_rewards
 from tests import pointmass
 
 SMALL = PPOConfig(
@@ -49,7 +50,7 @@ def weights(of: PPOLearner) -> dict[str, Tensor]:
 def test_the_value_behind_a_time_limit_is_added_on_the_learned_reward() -> None:
     ours = learner()
     batch = ours.collect()
-    ours._give_rewards(batch, ones)
+    give_rewards(ours.model, ours._scale, batch, ones)
     scale = ours.reward_scale
     given = torch.from_numpy(ours.model.rollout_buffer.rewards).flatten()
     with torch.no_grad():
@@ -66,7 +67,7 @@ def test_nothing_is_added_where_the_task_ended_the_episode() -> None:
     assert isinstance(bias, torch.Tensor)
     torch.nn.init.constant_(bias, 1.0)
     batch = ours.collect()
-    ours._give_rewards(batch, ones)
+    give_rewards(ours.model, ours._scale, batch, ones)
     given = torch.from_numpy(ours.model.rollout_buffer.rewards).flatten()
     assert batch.terminated.any()
     torch.testing.assert_close(
@@ -77,7 +78,7 @@ def test_nothing_is_added_where_the_task_ended_the_episode() -> None:
 def test_advantages_are_those_of_a_slow_oracle_on_the_learned_reward() -> None:
     ours = learner("Cliff-v0")
     batch = ours.collect()
-    ours._give_rewards(batch, position)
+    give_rewards(ours.model, ours._scale, batch, position)
     model, buffer = ours.model, ours.model.rollout_buffer
     reward = position(batch).double().numpy() / ours.reward_scale
     with torch.no_grad():

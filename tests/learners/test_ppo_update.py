@@ -10,6 +10,7 @@ from torch import Tensor
 
 from irl.core.types import Transitions
 from irl.learners.ppo import PPOConfig, PPOLearner
+from irl.learners.ppo_rollout import give_rewards
 from tests import pointmass  # noqa: F401  registers the tasks
 
 SMALL = PPOConfig(
@@ -25,7 +26,7 @@ def position(batch: Transitions) -> Tensor:
 def learner(**changes: Any) -> PPOLearner:
     ours = PPOLearner("PointMass-v0", [0, 1], replace(SMALL, **changes), seed=0, total_steps=1280)
     # away from the first weights, so that ratios are clipped and values are wrong
-    ours._give_rewards(ours.collect(), position)
+    give_rewards(ours.model, ours._scale, ours.collect(), position)
     return ours
 
 

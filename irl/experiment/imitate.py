@@ -1,0 +1,159 @@
+"""Imitation with a model of Stable-Baselines3's own making, from Python.
+
+>>> from stable_baselines3 import PPO
+>>> import irl
+>>> model = PPO("MlpPolicy", "Hopper-v5", learning_rate=1e-4)                       # doctest: +SKIP
+>>> demos = irl.load_demos("irl/hopper/expert-v0", episodes=5)                      # doctest: +SKIP
+>>> reward = irl.imitate(model, demos, method="gail", steps=200_000)                # doctest: +SKIP
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from irl.algorithms.adversarial import Adversarial, ReplayedScheduleConfig, ScheduleConfig
+from irl.algorithms.interleaved import Interleaved, InterleavedConfig
+from irl.algorithms.loop import Round
+from irl.core.nets import fitted_normaliser
+from irl.core.rng import torch_stream
+from irl.core.types import Episode, Transitions, from_episodes
+from irl.discriminators.airl import AIRL, AIRLConfig
+from irl.discriminators.gail import GAIL, GAILConfig
+from irl.envs.absorbing import absorb
+from irl.learners.ready import ReadyPPO, ReadySAC, ready
+from irl.rewards.learned import LearnedReward, RewardSpec
+from irl.rewards.nets import SEES
+
+Schedule = ScheduleConfig | InterleavedConfig
+
+
+def imitate(
+    model: Any,
+    demos: Sequence[Episode],
+    *,
+    method: str = "gail",
+    steps: int,
+    seed: int = 0,
+    discriminator: GAILConfig | AIRLConfig | None = None,
+    schedule: Schedule | None = None,
+    on_round: Callable[[Round], None] | None = None,
+) -> LearnedReward:
+    """Train a ready-made PPO or SAC on a reward learned from `demos`; the reward as it is at the end.
+
+    The model keeps its networks, settings and environments, and is trained in place, from where it is: what
+    was learned before counts. Time limits, and what follows a termination, are as with `irl train`.
+
+    Args:
+        model: of stable_baselines3, with environments of flat Box observations and actions.
+        demos: episodes of the same task.
+        method: `gail` or `airl`. DAC is refused: its actor and critics see the indicator of the absorbing
+            state, so they must be made for it; `irl train dac` makes them.
+        steps: environment steps; the last round may go past them.
+        seed: of the discriminator; the model has its own.
+        discriminator: settings; the method's defaults unless given.
+        schedule: `ScheduleConfig` for PPO, `InterleavedConfig` for SAC; the method's defaults unless given.
+        on_round: told of each round, e.g. to print its metrics.
+
+    Raises:
+        ValueError: the model, the demonstrations or the settings do not go together; the message says why.
+        NotFinite: a weight or a reward became NaN or infinite.
+    """
+    if method not in ("gail", "airl"):
+        raise ValueError(_refused(method))
+    expert = from_episodes(demos)
+    settings = discriminator or _defaults(method, type(model).__name__)
+    _check(model, expert, method, settings)
+    scale = settings.scale if isinstance(settings, AIRLConfig) else settings.absorbing_scale
+    learner = ready(model, steps, absorbing=scale > 0)
+    judge = _discriminator(learner, expert, settings, seed)
+    if scale:
+        expert = absorb(expert)
+    rng = torch_stream(seed, "minibatches", model.device)
+    algorithm = _algorithm(learner, judge, expert.to(model.device), schedule, rng, scale > 0)
+    for round_ in algorithm.rounds(steps):
+        if on_round is not None:
+            on_round(round_)
+    return _reward(learner, judge, method, seed)
+
+
+def _refused(method: str) -> str:
+    if method == "dac":
+        return (
+            "DAC's actor and critics see the indicator of the absorbing state, so a ready-made model, which "
+            "was made without it, cannot be its learner; use: irl train dac, or method='gail' with a SAC"
+        )
+    return f"unknown method {method!r}; expected 'gail' or 'airl'"
+
+
+def _defaults(method: str, algorithm: str) -> GAILConfig | AIRLConfig:
+    if method == "gail":
+        return GAILConfig()
+    # SAC pays for entropy itself
+    return AIRLConfig(lr=3e-4, reward="f") if algorithm == "SAC" else AIRLConfig()
+
+
+def _check(model: Any, expert: Transitions, method: str, settings: GAILConfig | AIRLConfig) -> None:
+    if isinstance(settings, AIRLConfig) != (method == "airl"):
+        raise ValueError(f"{type(settings).__name__} are no settings of {method}")
+    observations, actions = model.observation_space.shape, model.action_space.shape
+    if (expert.obs.shape[1:], expert.action.shape[1:]) != (observations, actions):
+        raise ValueError(
+            f"the demonstrations have observations of {tuple(expert.obs.shape[1:])} and actions of "
+            f"{tuple(expert.action.shape[1:])}, the model {observations} and {actions}"
+        )
+    bonus = type(model).__name__ == "SAC" or getattr(model, "ent_coef", 0.0) > 0
+    if isinstance(settings, AIRLConfig) and settings.reward == "f-log-pi" and bonus:
+        raise ValueError(
+            "entropy would be paid twice: by the model's ent_coef and by reward='f-log-pi'; use "
+            "AIRLConfig(reward='f'), or a PPO with ent_coef=0"
+        )
+
+
+def _discriminator(
+    learner: ReadyPPO | ReadySAC, expert: Transitions, settings: GAILConfig | AIRLConfig, seed: int
+) -> GAIL | AIRL:
+    model = learner.model
+    sizes = expert.obs.shape[1], expert.action.shape[1]
+    shared = {
+        "normaliser": fitted_normaliser(expert.obs),
+        "init_rng": torch_stream(seed, "discriminator weights"),
+        "rng": torch_stream(seed, "discriminator", model.device),
+        "gamma": model.gamma,
+    }
+    if isinstance(settings, AIRLConfig):
+        return AIRL(*sizes, settings, log_pi=learner.log_pi, **shared)
+    return GAIL(*sizes, settings, **shared)
+
+
+def _algorithm(
+    learner: ReadyPPO | ReadySAC,
+    judge: GAIL | AIRL,
+    expert: Transitions,
+    schedule: Schedule | None,
+    rng: Any,
+    absorbing: bool,
+) -> Adversarial | Interleaved:
+    if isinstance(learner, ReadySAC):
+        chosen = schedule or InterleavedConfig()
+        if not isinstance(chosen, InterleavedConfig):
+            raise ValueError(f"SAC's schedule is an InterleavedConfig, not a {type(chosen).__name__}")
+        return Interleaved(learner, judge, expert, chosen, rng)
+    chosen = schedule or (ReplayedScheduleConfig() if isinstance(judge, AIRL) else ScheduleConfig())
+    if not isinstance(chosen, ScheduleConfig):
+        raise ValueError(f"PPO's schedule is a ScheduleConfig, not a {type(chosen).__name__}")
+    return Adversarial(learner, judge, expert, chosen, rng, absorbing=absorbing)
+
+
+def _reward(learner: ReadyPPO | ReadySAC, judge: GAIL | AIRL, method: str, seed: int) -> LearnedReward:
+    found = learner.venv.get_attr("spec")[0]
+    spec = RewardSpec(
+        env_id=found.id if found is not None else "",
+        method=method,
+        reward_map=judge.reward_map,
+        inputs=SEES[judge.net.spec.sees],
+        net=judge.net.spec,
+        gamma=judge.gamma,
+        reward_scale=learner.reward_scale,
+        env_steps=learner.env_steps,
+        provenance={"seed": seed},
+    )
+    return LearnedReward(spec, judge.net)

@@ -1,0 +1,92 @@
+"""`irl.imitate`: ready-made models of SB3 learn from demonstrations, and DAC says why it takes none."""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+
+import irl
+from irl.algorithms.adversarial import ScheduleConfig
+from irl.algorithms.interleaved import InterleavedConfig
+from irl.algorithms.loop import Round
+from irl.core.types import from_episodes
+from irl.discriminators.airl import AIRLConfig
+from irl.discriminators.gail import GAILConfig
+from irl.rewards.artefact import load_reward, save_reward
+from tests import pointmass
+from tests.learners.test_ready import a_ppo, a_sac, envs, weights
+
+MAKE = {"PPO": a_ppo, "SAC": a_sac}
+
+
+@pytest.mark.parametrize("algorithm", MAKE)
+@pytest.mark.parametrize("method", ["gail", "airl"])
+def test_the_model_is_trained_in_place_and_the_reward_is_an_artefact(
+    algorithm: str, method: Any, tmp_path: Path
+) -> None:
+    model, seen = MAKE[algorithm](envs("Cliff-v0")), list[Round]()
+    before = weights(model)
+    demos = pointmass.demonstrations(3)
+    small: Any = GAILConfig(hidden=(8,)) if method == "gail" else None
+    reward = irl.imitate(model, demos, method=method, steps=300, discriminator=small, on_round=seen.append)
+    assert seen[-1].env_steps == model.num_timesteps == reward.spec.env_steps >= 300
+    after = weights(model)
+    assert any(not torch.equal(before[name], after[name]) for name in before)
+    assert (reward.spec.env_id, reward.spec.method, reward.spec.gamma) == ("Cliff-v0", method, 0.99)
+    steps = from_episodes(demos)
+    save_reward(tmp_path, reward.spec, reward.net)
+    assert torch.equal(load_reward(tmp_path)(steps), reward(steps))
+
+
+def test_gail_teaches_a_ready_made_ppo_the_task() -> None:
+    model = PPO(
+        "MlpPolicy",
+        envs(n=8),
+        n_steps=64,
+        batch_size=128,
+        learning_rate=1e-3,
+        gamma=0.9,
+        policy_kwargs={"net_arch": [32]},
+        seed=0,
+    )
+
+    def mean_return() -> float:
+        env = gym.make("PointMass-v0")
+        returns = []
+        for seed in range(10):
+            obs, _ = env.reset(seed=seed)
+            total, over = 0.0, False
+            while not over:
+                obs, reward, terminated, truncated, _ = env.step(model.predict(obs, deterministic=True)[0])
+                total, over = total + float(reward), terminated or truncated
+            returns.append(total)
+        return float(np.mean(returns))
+
+    expert = np.mean([episode.return_ for episode in pointmass.demonstrations(5)])
+    untrained = mean_return()
+    irl.imitate(model, pointmass.demonstrations(5), steps=15_000)
+    assert (mean_return() - untrained) / (expert - untrained) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"method": "dac"}, "indicator of the absorbing state.*use: irl train dac"),
+        ({"method": "bc"}, "unknown method 'bc'; expected 'gail' or 'airl'"),
+        ({"method": "airl", "discriminator": GAILConfig()}, "GAILConfig are no settings of airl"),
+        ({"schedule": InterleavedConfig()}, "PPO's schedule is a ScheduleConfig"),
+        ({"model": a_sac, "schedule": ScheduleConfig()}, "SAC's schedule is an InterleavedConfig"),
+        ({"model": lambda: a_ppo(ent_coef=0.1), "method": "airl"}, "entropy would be paid twice"),
+        ({"model": a_sac, "method": "airl", "discriminator": AIRLConfig()}, "entropy would be paid twice"),
+        ({"model": lambda: a_sac(envs("Pendulum-v1", 1))}, r"observations of \(2,\) and actions of \(2,\)"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(change: dict[str, Any], message: str) -> None:
+    words: dict[str, Any] = {"model": a_ppo, "steps": 100} | change
+    model = words.pop("model")()
+    with pytest.raises(ValueError, match=message):
+        irl.imitate(model, pointmass.demonstrations(1), **words)
