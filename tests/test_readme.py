@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from stable_baselines3 import PPO
 
 from irl.core.records import open_run
 from irl.experiment.cli import COMMANDS, main
@@ -17,12 +18,15 @@ def test_the_library_lines_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
     main(["demos", "generate", "--env-id", "Hopper-v5", "--episodes", "5", "--seed", "0"])
     words = "--demos irl/hopper/expert-v0 --demo-episodes 4 --steps 2048 --watch.eval-episodes 0"
     main(f"train gail --env-id Hopper-v5 --out runs/hopper {words} --schedule.epochs 1".split())
-    (block,) = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
+    block, ready_made = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
     last = list(open_run(Path("runs/hopper")).snapshots().values())[-1].name
     capsys.readouterr()
-    exec(block.replace("000245760", last), {})
+    names: dict[str, object] = {"PPO": PPO}
+    exec(block.replace("000245760", last), names)
     printed = re.findall(r"-?\d+\.\d+", capsys.readouterr().out)
     assert len(printed) == 3
+    exec(ready_made.replace("200_000", "2048"), names)
+    assert names["reward"].spec.env_steps == 2048  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def test_every_command_it_names_exists() -> None:
