@@ -20,6 +20,7 @@ from irl.algorithms.probe import read_episodes
 from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.finite import NotFinite
+from irl.core.memory import peak_memory
 from irl.core.metrics import Row
 from irl.core.records import RunFolder, snapshot_steps
 from irl.core.rng import episode_seeds
@@ -90,6 +91,7 @@ class Player:
             with self.folder.locked():
                 self.resume()
                 self.play()
+            print(f"peak memory {peak_memory() / 1e9:.2f} GB", file=sys.stderr)
         except Interrupted:
             print(f"stopped; go on with: {to_go_on}", file=sys.stderr)
             raise

@@ -31,7 +31,7 @@ from irl.envs.tasks import task_name
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results" / "throughput.json"
-OURS = ("gail", "airl", "sb3-ppo", "dac", "dac-float32", "sb3-sac")
+OURS = ("gail", "airl", "sb3-ppo", "dac", "dac-defaults", "dac-float32", "sb3-sac")
 PEERS = ("gail", "airl")
 EPISODES = 4
 RATIOS = {
@@ -39,6 +39,7 @@ RATIOS = {
     "airl_vs_imitation": ("airl", "imitation-airl"),
     "gail_vs_sb3_ppo": ("gail", "sb3-ppo"),
     "dac_vs_sb3_sac": ("dac", "sb3-sac"),
+    "dac_defaults_vs_sb3_sac": ("dac-defaults", "sb3-sac"),
     "dac_vs_sb3_sac_float32": ("dac-float32", "sb3-sac"),
 }
 

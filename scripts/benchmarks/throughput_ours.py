@@ -85,9 +85,10 @@ def airl(task: str) -> AIRLRun:
     return AIRLRun(env_id=task, learner=ppo(s), discriminator=discriminator, schedule=again)
 
 
-def dac(task: str, products: str) -> DACRun:
-    """DAC's defaults, with the products of its SAC as asked."""
-    return DACRun(env_id=task, learner=dataclasses.replace(OFF_POLICY, products=products))
+def dac(task: str, products: str, quantiles: int = 0) -> DACRun:
+    """DAC's defaults; without quantiles its critics are those of the SAC that it is held against."""
+    learner = dataclasses.replace(OFF_POLICY, products=products, quantiles=quantiles)
+    return DACRun(env_id=task, learner=learner)
 
 
 def rounds(run: Imitation, root: Path, shares: dict[str, float] | None) -> Iterator[int]:
@@ -179,6 +180,7 @@ def contender(name: str, task: str, root: Path, shares: dict[str, float] | None)
         "gail": lambda: (rounds(gail(task), root, shares), 1),
         "airl": lambda: (rounds(airl(task), root, shares), 1),
         "dac": lambda: (rounds(dac(task, "bfloat16"), root, shares), 2),
+        "dac-defaults": lambda: (rounds(dac(task, "bfloat16", OFF_POLICY.quantiles), root, shares), 2),
         "dac-float32": lambda: (rounds(dac(task, "float32"), root, shares), 2),
         "sb3-ppo": lambda: (sb3_ppo(task), 1),
         "sb3-sac": lambda: (sb3_sac(task), 4),

@@ -135,3 +135,11 @@ def marked(batch: Transitions) -> list[tuple[float, ...]]:
     assert batch.next_absorbing is not None
     flags = zip(batch.absorbing.tolist(), batch.next_absorbing.tolist(), strict=True)
     return [(*row, *flag) for row, flag in zip(flat(batch), flags, strict=True)]
+
+
+def test_a_million_steps_of_humanoid_take_less_than_two_gigabytes() -> None:
+    # what is not written to takes no memory, so this is cheap to ask
+    replay = Replay(1_000_000, 1, 348, 17)
+    columns = [value for value in vars(replay).values() if isinstance(value, torch.Tensor)]
+    assert sum(column.untyped_storage().nbytes() for column in columns) < 2e9
+    assert sum(column.shape[-1] == 348 and len(column) > 10**6 for column in columns) == 1
