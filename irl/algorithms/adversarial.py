@@ -64,6 +64,21 @@ class Discriminator(Protocol):
     def load_state_dict(self, state: dict[str, Any]) -> None: ...
 
 
+@runtime_checkable
+class Annealed(Protocol):
+    """A discriminator that wants to know how much of the run remains."""
+
+    def anneal(self, remaining: float) -> None:
+        """Said before each round: the share of the run's steps that is not yet taken."""
+        ...
+
+
+def anneal(discriminator: Discriminator, taken: int, steps: int) -> None:
+    """Tell it, if it wants to know."""
+    if isinstance(discriminator, Annealed):
+        discriminator.anneal(1.0 - taken / steps)
+
+
 @torch.no_grad()
 def judge(discriminator: Discriminator, expert: Transitions, policy: Transitions) -> Metrics:
     """How well it tells the demonstrations from these steps of the policy."""
@@ -108,6 +123,7 @@ class Adversarial:
             NotFinite: the discriminator's weights, the reward or the policy's weights are not finite.
         """
         while self.learner.env_steps < steps:
+            anneal(self.discriminator, self.learner.env_steps, steps)
             batch = self.learner.collect()
             # Discriminator first: the rollout is then rewarded by what was just fitted to it.
             metrics = self._fit(batch)

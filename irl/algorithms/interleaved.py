@@ -15,7 +15,7 @@ from typing import Any
 
 import torch
 
-from irl.algorithms.adversarial import Discriminator, judge
+from irl.algorithms.adversarial import Discriminator, anneal, judge
 from irl.algorithms.loop import Learner, Round
 from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
@@ -59,6 +59,7 @@ class Interleaved:
         """
         while self.learner.env_steps < steps:
             before = self._updates
+            anneal(self.discriminator, self.learner.env_steps, steps)
             batch = self.learner.collect()
             check_finite(named("discriminator", self.discriminator.state_dict()["net"]))
             taken = self._updates // self.schedule.every - before // self.schedule.every

@@ -30,6 +30,7 @@ from torch import Tensor
 
 from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
+from irl.core.schedule import rate_at
 from irl.core.types import Metrics, Transitions
 from irl.discriminators import losses, regularisers
 from irl.discriminators.shaped_slopes import ShapedSlopes, Slopes, as_rows, from_rows, joined
@@ -50,6 +51,8 @@ class AIRLConfig:
     """Between the layers."""
     lr: float = 1e-3
     """Adam step size."""
+    lr_schedule: Literal["constant", "linear"] = "constant"
+    """`constant`, or `linear` from `lr` to 0 over the run: the reward then comes to rest."""
     reward: Literal["f", "f-log-pi"] = "f-log-pi"
     """What the learner is paid. `f-log-pi` pays for entropy, so the learner must not; `f` does not."""
     terminal: Literal["absorbing", "mask"] = "absorbing"
@@ -152,6 +155,11 @@ class AIRL:
         of_h = regularisers.slope_penalty(slopes.h, 0.0)
         others = self.config.reward_penalty * of_g + self.config.potential_penalty * of_h
         return regularisers.slope_penalty(slopes.f), others
+
+    def anneal(self, remaining: float) -> None:
+        """Said before each round: which share of the run remains."""
+        c = self.config
+        self.optimizer.param_groups[0]["lr"] = rate_at(c.lr, c.lr_schedule, remaining)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on."""

@@ -19,6 +19,7 @@ from torch import Tensor
 
 from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
+from irl.core.schedule import rate_at
 from irl.core.types import Metrics, Transitions
 from irl.discriminators import losses, regularisers
 from irl.discriminators.slopes import Slopes
@@ -34,6 +35,8 @@ class GAILConfig:
     """Width of each hidden layer."""
     lr: float = 1e-3
     """Adam step size."""
+    lr_schedule: Literal["constant", "linear"] = "constant"
+    """`constant`, or `linear` from `lr` to 0 over the run: the reward then comes to rest."""
     gradient_penalty: float = 5.0
     """Weight of the gradient penalty; 0 turns it off."""
     reward_map: Literal["gail", "logit", "log_d", "fairl"] = "gail"
@@ -117,6 +120,11 @@ class GAIL:
         self._slopes.refresh()
         self._updates += 1
         return {"discriminator/loss": loss.item(), "discriminator/gradient_penalty": self._penalty}
+
+    def anneal(self, remaining: float) -> None:
+        """Said before each round: which share of the run remains."""
+        c = self.config
+        self.optimizer.param_groups[0]["lr"] = rate_at(c.lr, c.lr_schedule, remaining)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on."""

@@ -27,6 +27,7 @@ from torch import Tensor, nn
 from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
 from irl.core.nets import ACTIVATIONS, Normaliser
+from irl.core.schedule import learning_rate
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.envs.discrete import OneHot
 from irl.learners.averaging import WeightAverage
@@ -34,7 +35,6 @@ from irl.learners.features import NormalisedFeatures
 from irl.learners.ppo_rollout import give_rewards, log_pi
 from irl.learners.ppo_update import PPOUpdate, SB3Update
 from irl.learners.random_state import read_global, write_global
-from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
 from irl.policies.policy import Policy, PolicySpec
 from irl.rewards.normalise import ReturnScale

@@ -34,13 +34,13 @@ from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
 from irl.core.nets import CLIP, NO_CLIP, Normaliser, linear
 from irl.core.rng import torch_stream
+from irl.core.schedule import learning_rate
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures, Spaces, widened
 from irl.learners.heads import Lowest, Quantiles
 from irl.learners.replay import Replay
 from irl.learners.sac_update import SACUpdate
-from irl.learners.schedule import learning_rate
 from irl.learners.vec import RecordingVecEnv
 from irl.policies import densities
 from irl.policies.policy import Policy, PolicySpec

@@ -83,6 +83,23 @@ def test_the_discriminator_learns_before_the_rollout_is_rewarded() -> None:
     assert rounds[0].metrics["discriminator/accuracy_policy"] == 0.0
 
 
+def test_a_discriminator_that_wants_to_know_is_told_what_remains() -> None:
+    class Asking(Told):
+        def anneal(self, remaining: float) -> None:
+            self.calls.append(f"{remaining:.2f} remains")
+
+    told = Asking()
+    expert = from_episodes(pointmass.demonstrations(2))
+    loop = Adversarial(told, told, expert, ScheduleConfig(15), torch_stream(0, "minibatches"))
+    list(loop.rounds(4 * pointmass.STEPS))
+    said = [call for call in told.calls if call in ("collect", "improve") or "remains" in call]
+    assert said == [
+        word
+        for share in ("1.00", "0.75", "0.50", "0.25")
+        for word in (f"{share} remains", "collect", "improve")
+    ]
+
+
 def test_a_round_reports_the_mean_over_all_its_minibatches() -> None:
     class Counting(Told):
         def update(self, expert: Transitions, policy: Transitions) -> Metrics:

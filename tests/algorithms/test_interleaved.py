@@ -48,6 +48,19 @@ def loop(told: Told, every: int = 1, scale: float = 10.0) -> Interleaved:
     return Interleaved(learner, told, expert, InterleavedConfig(every), torch_stream(0, "minibatches"))
 
 
+def test_a_discriminator_that_wants_to_know_is_told_what_remains() -> None:
+    class Asking(Told):
+        def __init__(self) -> None:
+            super().__init__()
+            self.said: list[float] = []
+
+        def anneal(self, remaining: float) -> None:
+            self.said.append(remaining)
+
+    list(loop(told := Asking()).rounds(400))
+    assert told.said == [1.0, 0.75, 0.5, 0.25]
+
+
 def test_the_discriminator_learns_from_each_batch_before_it_rewards_it() -> None:
     told = Told()
     rounds = list(loop(told).rounds(300))

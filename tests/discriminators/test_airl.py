@@ -239,3 +239,13 @@ def test_the_same_seeds_give_the_same_weights_and_it_goes_on_to_the_bit(tmp_path
 def test_settings_that_make_no_sense_are_refused(setting: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         AIRLConfig(**setting)
+
+
+def test_a_linear_rate_falls_to_nothing_and_a_constant_one_stays() -> None:
+    linear = replace(SMALL, lr_schedule="linear")
+    for config, remaining, moves in ((linear, 0.25, 0.25), (linear, 0.0, 0.0), (SMALL, 0.0, 1.0)):
+        of = airl(config)
+        before = weights(of)
+        of.anneal(remaining)
+        of.update(*classes())
+        assert float((weights(of) - before).abs().max()) == pytest.approx(moves * SMALL.lr, rel=0.1, abs=1e-6)

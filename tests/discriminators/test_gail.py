@@ -1,4 +1,5 @@
 import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -228,3 +229,19 @@ def test_a_discriminator_goes_on_from_its_state_with_bfloat16_products_too() -> 
 def test_a_copy_is_refused_because_it_would_train_weights_that_do_not_judge() -> None:
     with pytest.raises(TypeError, match="tied to its modules' weights"):
         copy.deepcopy(discriminator())
+
+
+def test_a_linear_rate_falls_to_nothing_and_a_constant_one_stays() -> None:
+    linear, constant = replace(SMALL, lr_schedule="linear"), SMALL
+    for config, remaining, moves in (
+        (linear, 1.0, 1.0),
+        (linear, 0.25, 0.25),
+        (linear, 0.0, 0.0),
+        (constant, 0.0, 1.0),
+    ):
+        d = discriminator(config)
+        before = weights(d)
+        d.anneal(remaining)
+        d.update(*two_classes())
+        # Adam's first step is of the size of its rate
+        assert float((weights(d) - before).abs().max()) == pytest.approx(moves * SMALL.lr, abs=1e-4)

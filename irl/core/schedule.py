@@ -14,3 +14,9 @@ def learning_rate(lr: float, schedule: Literal["constant", "linear"]) -> float |
     (0.25, 0.0)
     """
     return lr if schedule == "constant" else lambda remaining: lr * max(remaining, 0.0)
+
+
+def rate_at(lr: float, schedule: Literal["constant", "linear"], remaining: float) -> float:
+    """The rate when that share of the run remains."""
+    rate = learning_rate(lr, schedule)
+    return rate(remaining) if callable(rate) else rate
