@@ -3,8 +3,8 @@
     python scripts/benchmarks/retrained.py dac --tasks Hopper-v5 --seeds 1 2 3
 
 Takes the runs that methods.py left, their snapshots at these shares of the steps, fixed beforehand, and
-trains a policy on each by `irl retrain`. Its seeds are none of the run's. The figure is the true return of the policy
-at the last step, in 20 episodes. One JSON a cell; a cell whose JSON is there is not run again.
+trains a policy on each by `irl retrain`. Its seeds are none of the run's. The figure is the true return of
+the policy at the last step, in 20 episodes. One JSON a cell; a cell whose JSON is there is not run again.
 """
 
 import json
