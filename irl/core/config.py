@@ -2,6 +2,9 @@
 
 `dataclasses.asdict` forgets which member of a union was chosen; a class that is a choice says so with a
 `KIND: ClassVar[str]`, which is written as "kind" and decides on the way back.
+
+A class whose settings have become more says in `ADDED: ClassVar[dict]` what those were, in effect, before
+they could be set: what was written then is read as it was meant, whatever a default is by now.
 """
 
 import sys
@@ -94,7 +97,7 @@ def from_json(cls: Any, content: Any, where: str = "config") -> Any:
 def _dataclass(cls: type, content: Any, where: str) -> Any:
     if not isinstance(content, dict):
         raise UserError(f"{where}: expected the settings of {cls.__name__}, found {_short(content)}")
-    given, kind = dict(content), getattr(cls, "KIND", None)
+    given, kind = {**getattr(cls, "ADDED", {}), **content}, getattr(cls, "KIND", None)
     if kind and given.pop("kind", kind) != kind:
         raise UserError(f"{where}: expected kind {kind!r}, found {_short(content['kind'])}")
     hints = get_type_hints(cls)

@@ -22,7 +22,7 @@ lead into s_abs, where the paper has none; the policy learns from f - log pi or 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import torch
 from jaxtyping import Float
@@ -40,6 +40,8 @@ from irl.rewards.shaped import ShapedNet, ShapedSpec
 @dataclass(frozen=True)
 class AIRLConfig:
     """How g and h learn."""
+
+    ADDED: ClassVar[dict[str, Any]] = {"lr_schedule": "constant"}
 
     inputs: Literal["obs", "obs_action"] = "obs_action"
     """What g sees. `obs` is for a reward to be taken where the dynamics are others; it imitates less well."""

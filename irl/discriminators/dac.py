@@ -16,7 +16,7 @@ Adam at 3e-4 (1e-3 there); s_T -> s_abs weighs as s_abs does.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from irl.discriminators.gail import GAIL, GAILConfig
 
@@ -24,6 +24,12 @@ from irl.discriminators.gail import GAIL, GAILConfig
 @dataclass(frozen=True)
 class DACConfig(GAILConfig):
     """How the discriminator learns: GAIL's settings with DAC's values."""
+
+    ADDED: ClassVar[dict[str, Any]] = {
+        "inputs": "obs_action",
+        "products": "float32",
+        "lr_schedule": "constant",
+    }
 
     hidden: tuple[int, ...] = (128, 128)
     """Width of each hidden layer."""

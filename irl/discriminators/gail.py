@@ -11,7 +11,7 @@ causal-entropy term here, the learner has its own; the policy step is any learne
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import torch
 from jaxtyping import Float
@@ -30,6 +30,19 @@ from irl.rewards.nets import LogitNet, LogitSpec
 @dataclass(frozen=True)
 class GAILConfig:
     """How the discriminator learns."""
+
+    ADDED: ClassVar[dict[str, Any]] = {
+        "reward_map": "gail",
+        "activation": "tanh",
+        "penalty_center": 1.0,
+        "penalty_every": 1,
+        "entropy": 0.0,
+        "spectral_norm": False,
+        "absorbing_scale": 0.0,
+        "inputs": "obs_action",
+        "products": "float32",
+        "lr_schedule": "constant",
+    }
 
     hidden: tuple[int, ...] = (100, 100)
     """Width of each hidden layer."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import tyro
 
@@ -45,6 +45,7 @@ class ImitationRun:
     """What every method that learns from demonstrations is told."""
 
     KIND: ClassVar[str] = ""
+    ADDED: ClassVar[dict[str, Any]] = {"env_kwargs": [], "demo_rate": 1}
     env_id: str
     """Gymnasium id of the task, e.g. Hopper-v5."""
     env_kwargs: Words = ()

@@ -49,6 +49,14 @@ class PPOConfig:
     """
 
     KIND: ClassVar[str] = "ppo"
+    ADDED: ClassVar[dict[str, Any]] = {
+        "clip_range_vf": None,
+        "normalize_advantage": True,
+        "vf_coef": 0.5,
+        "max_grad_norm": 0.5,
+        "target_kl": None,
+        "activation": "tanh",
+    }
     n_envs: int = 16
     """Environments stepped side by side."""
     steps_per_round: int = 2048

@@ -57,6 +57,17 @@ class SACConfig:
     """
 
     KIND: ClassVar[str] = "sac"
+    ADDED: ClassVar[dict[str, Any]] = {
+        "n_envs": 1,
+        "updates_per_step": 1.0,
+        "target_update_interval": 1,
+        "ent_coef": "auto",
+        "target_entropy": "auto",
+        "n_critics": 2,
+        "quantiles": 0,
+        "dropped_quantiles": 2,
+        "products": "float32",
+    }
     n_envs: int = 1
     """Environments stepped at once."""
     steps_per_round: int = 1000

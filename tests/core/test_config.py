@@ -11,9 +11,12 @@ from hypothesis import strategies as st
 from irl.algorithms.adversarial import ScheduleConfig
 from irl.core.config import from_json, to_json
 from irl.core.errors import UserError
+from irl.discriminators.airl import AIRLConfig
+from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
-from irl.experiment.configs import DACRun, ExpertRun, GAILRun, GAILSACRun, Watch
+from irl.experiment.configs import AIRLRun, DACRun, ExpertRun, GAILRun, GAILSACRun, Watch
 from irl.learners.ppo import PPOConfig
+from irl.learners.sac import SACConfig
 
 
 @dataclass(frozen=True)
@@ -230,3 +233,34 @@ def test_more_threads_than_any_machine_has_are_refused() -> None:
     for threads in (0, -1, 1025, 10**9):
         with pytest.raises(ValueError, match=f"threads must be in 1 to 1024, not {threads}"):
             GAILRun("Hopper-v5", threads=threads)
+
+
+@dataclass(frozen=True)
+class Grown:
+    """Settings that became more: `wide` was in effect False, its default is True by now."""
+
+    ADDED: ClassVar[dict[str, Any]] = {"wide": False, "names": ["a"]}
+    size: int = 1
+    wide: bool = True
+    names: tuple[str, ...] = ()
+
+
+def test_what_was_written_before_a_setting_existed_is_read_as_it_was_meant() -> None:
+    assert from_json(Grown, {"size": 2}) == Grown(2, False, ("a",))
+    assert from_json(Grown, {"size": 2, "wide": True, "names": []}) == Grown(2, True, ())
+    with pytest.raises(UserError, match="missing size"):
+        from_json(Grown, {})
+
+
+def test_every_setting_that_was_added_is_one_and_of_its_type() -> None:
+    seen = 0
+    settings = (GAILConfig(), DACConfig(), AIRLConfig(), PPOConfig(), SACConfig())
+    for config in (*settings, GAILRun("Task-v0"), DACRun("Task-v0"), AIRLRun("Task-v0")):
+        added = config.ADDED
+        seen += len(added)
+        # a name that is no field, or a value of another type, is refused
+        before = {name: value for name, value in to_json(config).items() if name not in added}
+        read = from_json(type(config), before)
+        for name, value in added.items():
+            assert to_json(getattr(read, name)) == value
+    assert seen > 20
