@@ -89,6 +89,22 @@ class LearnedReward:
             return self.net.paid(self.spec.reward_map, batch, self.spec.gamma)
         return tail.reward(self.net, self.spec.reward_map, batch, self.spec.gamma)
 
+    def anchored(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """The same reward with the absorbing state at 0: what each step pays above what s_abs pays a step.
+
+            r(s, a) - r(s_abs),   and nothing after a termination
+
+        Over any episode, followed by s_abs for ever, it adds up to r's discounted sum less r(s_abs) / (1 -
+        gamma), which no policy changes. A reward that knows no s_abs is as it was.
+        """
+        self._check(batch)
+        net, pays = self.net, self.spec.reward_map
+        if isinstance(net, ShapedNet):
+            of_steps = net.g(batch) if pays == "g" else net.f(batch, self.spec.gamma)
+            return of_steps - net.a_step_in_absorbing(pays, self.spec.gamma) if _absorbs(net) else of_steps
+        of_steps = MAPS[pays](net(batch))
+        return of_steps - MAPS[pays](net.of_absorbing()) if _absorbs(net) else of_steps
+
     def _check(self, batch: Transitions) -> None:
         given, expected = (batch.obs.shape[1], batch.action.shape[1]), self.spec.net
         blind = expected.sees != "obs_action"
@@ -97,6 +113,10 @@ class LearnedReward:
                 f"the reward of {self.spec.env_id} takes observations of {expected.obs_dim} and actions of "
                 f"{expected.action_dim}, the batch has {given[0]} and {given[1]}"
             )
+
+
+def _absorbs(net: LogitNet | ShapedNet) -> bool:
+    return net.spec.absorbing_scale > 0
 
 
 def save_reward(folder: Path, spec: RewardSpec, net: LogitNet | ShapedNet) -> None:
