@@ -32,6 +32,8 @@ def correlations(
 
     Needs the six moments of each episode only, so a thousand resamples cost one product of matrices.
     """
+    if not len(sums.values):
+        return np.full((len(drawn), sums.values.shape[1]), np.nan)
     x = sums.values - np.mean(sums.values, axis=0)
     scale = np.std(x, axis=0)
     x = x / np.where(scale > 0, scale, 1.0)

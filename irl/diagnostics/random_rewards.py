@@ -5,34 +5,55 @@
     noise       the same network of (s, a), scaled alike
 """
 
-import numpy as np
-from jaxtyping import Float
+from collections.abc import Callable
+from dataclasses import dataclass
 
-from irl.core.types import Transitions
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from irl.core.types import RewardFn, Transitions
 
 WIDTH = 64
 
 
-def shaping(
-    batch: Transitions, gamma: float, std: float, rng: np.random.Generator
-) -> Float[np.ndarray, "B"]:
-    """Potential shaping of standard deviation `std`: it changes no optimal policy.
+@dataclass(frozen=True, eq=False)
+class Scaled:
+    """A function of steps times a number."""
+
+    of: Callable[[Transitions], np.ndarray]
+    factor: float
+
+    def __call__(self, batch: Transitions) -> Float[Tensor, "B"]:
+        return torch.from_numpy(self.factor * self.of(batch))
+
+
+def shaping(batch: Transitions, gamma: float, std: float, rng: np.random.Generator) -> RewardFn:
+    """Potential shaping with the standard deviation `std` on `batch`: it changes no optimal policy.
 
     Source: Ng, Harada & Russell (1999), Policy Invariance Under Reward Transformations.
     """
-    now, ahead = (np.asarray(x.double().numpy()) for x in (batch.obs, batch.next_obs))
-    potential = _network(now, rng)
-    values = gamma * potential(ahead) * ~batch.terminated.numpy() - potential(now)
-    return _scaled(values, std)
+    potential = _network(batch.obs.double().numpy(), rng)
+
+    def shaped(batch: Transitions) -> np.ndarray:
+        now, ahead = batch.obs.double().numpy(), batch.next_obs.double().numpy()
+        return gamma * potential(ahead) * ~batch.terminated.numpy() - potential(now)
+
+    return _scaled(shaped, batch, std)
 
 
-def noise(batch: Transitions, std: float, rng: np.random.Generator) -> Float[np.ndarray, "B"]:
-    """A random network's reward of (s, a), of standard deviation `std`."""
-    seen = np.concatenate([batch.obs.double().numpy(), batch.action.double().numpy()], axis=1)
-    return _scaled(_network(seen, rng)(seen), std)
+def noise(batch: Transitions, std: float, rng: np.random.Generator) -> RewardFn:
+    """A random network's reward of (s, a), of the standard deviation `std` on `batch`."""
+
+    def seen(batch: Transitions) -> np.ndarray:
+        return torch.cat([batch.obs, batch.action], 1).double().numpy()
+
+    network = _network(seen(batch), rng)
+    return _scaled(lambda batch: network(seen(batch)), batch, std)
 
 
-def _network(seen: Float[np.ndarray, "B I"], rng: np.random.Generator):
+def _network(seen: Float[np.ndarray, "B I"], rng: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:
     """A function of rows like `seen`, whose moments standardise them."""
     mean, std = np.mean(seen, axis=0), np.std(seen, axis=0)
     std = np.where(std > 0, std, 1.0)
@@ -42,6 +63,6 @@ def _network(seen: Float[np.ndarray, "B I"], rng: np.random.Generator):
     return lambda x: np.tanh(np.tanh((x - mean) / std @ first + bias) @ second) @ last
 
 
-def _scaled(values: Float[np.ndarray, "B"], std: float) -> Float[np.ndarray, "B"]:
-    spread = float(np.std(values))
-    return values * (std / spread) if spread > 0 else values
+def _scaled(of: Callable[[Transitions], np.ndarray], batch: Transitions, std: float) -> Scaled:
+    spread = float(np.std(of(batch)))
+    return Scaled(of, std / spread if spread > 0 else 1.0)

@@ -20,114 +20,52 @@ import numpy as np
 from jaxtyping import Float
 
 from irl.core.rng import stream
-from irl.diagnostics import bootstrap, random_rewards
-from irl.diagnostics.distance import (
-    Distance,
-    cosine_distance,
-    pearson_distance,
-    why_undefined,
-)
+from irl.diagnostics.compare import Columns, compare
+from irl.diagnostics.distance import Distance, cosine_distance
 from irl.diagnostics.features import fitted
-from irl.diagnostics.segments import WHOLE, Segments, segments
-from irl.diagnostics.stack import Stack
+from irl.diagnostics.segments import WHOLE, segments
 from irl.diagnostics.values import td_errors
 
 CURVE = (1, 10, 50, 100, WHOLE)
 HEADLINE = 50
-SHAPINGS = 3
-"""Random shapings that the self-test takes the worst of."""
 
 
 @dataclass(frozen=True, eq=False)
 class Canonical:
-    """TD errors of R rewards, the reference first and after it those of the self-tests."""
+    """Columns of rewards, and what is left of them once their value functions are off."""
 
+    columns: Columns
     errors: Float[np.ndarray, "N R"]
-    raw: Float[np.ndarray, "N R"]
-    steps: Stack
-    gamma: float
-    rewards: int
-    """How many of the columns, after the reference, are rewards that were asked about."""
 
 
-def canonical(
-    truth: Float[np.ndarray, "N"],
-    rewards: Float[np.ndarray, "N R"],
-    steps: Stack,
-    gamma: float,
-    seed: int,
-) -> Canonical:
-    """The rewards, the reference and its self-tests with their value functions off.
+def canonical(of: Columns, seed: int) -> Canonical:
+    """The TD errors of every column; `seed` draws the features.
 
-    Args:
-        truth: the reference, a value a step of `steps`.
-        rewards: those to be compared with it.
-        seed: draws the features and the random rewards.
     Cost: that of `values.td_errors`, once for all.
     """
-    rng = stream(seed, "self tests")
-    std = float(np.std(truth))
-    tests = [truth + random_rewards.shaping(steps.batch, gamma, std, rng) for _ in range(SHAPINGS)]
-    tests += [-truth, random_rewards.noise(steps.batch, std, rng)]
-    raw = np.column_stack([truth, rewards, *tests])
-    features = fitted(steps.batch.obs.numpy(), stream(seed, "features"))
-    # what is not finite would spread over all through the shared products
-    usable = np.where(np.all(np.isfinite(raw), axis=0), raw, 0.0)
-    errors = td_errors(usable, steps, features, gamma)
-    return Canonical(errors, raw, steps, gamma, rewards.shape[1])
+    batch = of.steps.batch
+    features = fitted(batch.obs.numpy(), stream(seed, "features"))
+    return Canonical(of, td_errors(of.usable, of.steps, features, of.gamma))
 
 
-def distances(of: Canonical, n: int, seed: int, draws: int = bootstrap.DRAWS) -> list[Distance]:
+def distances(of: Canonical, n: int, seed: int) -> list[Distance]:
     """VAL_n of each reward to the reference, with its interval and self-tests.
 
     Segments of `WHOLE` episodes compare returns less the value of their first state.
     """
-    sums = segments(of.errors, of.steps.layout, of.gamma, n)
-    reasons = _reasons(of, sums, n)
-    drawn = bootstrap.counts(of.steps.layout, draws, stream(seed, "bootstrap"))
-    rho = bootstrap.correlations(sums, 0, drawn)
-    first_test = 1 + of.rewards
-    tests = [pearson_distance(sums.values[:, 0], column) for column in sums.values[:, first_test:].T]
-    found = []
-    for i in range(1, first_test):
-        reason = reasons[0] or reasons[i]
-        low, high = bootstrap.interval(np.sqrt((1.0 - rho[:, i]) / 2.0))
-        nan = float("nan")
-        found.append(
-            Distance(
-                name="VAL",
-                value=nan if reason else pearson_distance(sums.values[:, 0], sums.values[:, i]),
-                low=nan if reason else low,
-                high=nan if reason else high,
-                self_error=nan if reasons[0] else max(tests[:SHAPINGS]),
-                negation=tests[SHAPINGS],
-                random=tests[SHAPINGS + 1],
-                n=n,
-                size=len(sums.values),
-                episodes=len(np.unique(sums.episode)),
-                reason=reason,
-            )
-        )
-    return found
+    c = of.columns
+    return compare("VAL", segments(of.errors, c.steps.layout, c.gamma, n), c, seed, n, "segments")
 
 
-def curve(of: Canonical, ns: Sequence[int], seed: int) -> list[list[Distance]]:
-    """`distances` at each n: a row an n, a column a reward."""
-    return [distances(of, n, seed) for n in ns]
+def headline(of: Sequence[Distance]) -> Distance:
+    """Of one reward's curve the one at n = 50, or the longest below that its episodes have room for."""
+    fit = [d for d in of if d.n is not None and 0 < d.n <= HEADLINE]
+    known = [d for d in fit if d.reason is None]
+    return max(known or fit, key=lambda d: d.n or 0)
 
 
 def uncentred(of: Canonical, n: int) -> list[float]:
     """The cosine distance of each reward to the reference: an offset counts where episodes end early."""
-    values = segments(of.errors, of.steps.layout, of.gamma, n).values
-    return [cosine_distance(values[:, 0], values[:, i]) for i in range(1, 1 + of.rewards)]
-
-
-def _reasons(of: Canonical, sums: Segments, n: int) -> list[str | None]:
-    held, every = len(np.unique(sums.episode)), len(of.steps.layout.length)
-    if 2 * held < every:
-        # those that ended early would be all that is left of the others
-        return [f"segments of {n} steps fit into {held} of {every} episodes"] * (1 + of.rewards)
-    names = ["the hand-written reward"] + ["the learned reward"] * of.rewards
-    return [
-        why_undefined(name, of.raw[:, i], sums.values[:, i], "segments") for i, name in enumerate(names)
-    ]
+    c = of.columns
+    values = segments(of.errors, c.steps.layout, c.gamma, n).values
+    return [cosine_distance(values[:, 0], values[:, i]) for i in range(1, 1 + c.asked)]
