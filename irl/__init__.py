@@ -9,13 +9,16 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from irl.algorithms.probe_file import load_probe
 from irl.core.errors import UserError
 from irl.core.types import Episode, RewardFn, Transitions, concatenate, from_episodes
 from irl.demos.load import Demos, load_demos
+from irl.diagnostics.diagnose import diagnose
 from irl.envs.rollouts import rollout, rollouts
 from irl.policies.policy import Policy, load_policy
 from irl.policies.shelf import find as load_expert
 from irl.rewards.artefact import LearnedReward, load_reward
+from irl.rewards.mujoco import HandWritten
 from irl.rewards.wrapper import RewardWrapper
 
 if TYPE_CHECKING:
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Demos",
     "Episode",
+    "HandWritten",
     "LearnedReward",
     "Policy",
     "RewardFn",
@@ -32,10 +36,12 @@ __all__ = [
     "Transitions",
     "UserError",
     "concatenate",
+    "diagnose",
     "from_episodes",
     "load_demos",
     "load_expert",
     "load_policy",
+    "load_probe",
     "load_reward",
     "rollout",
     "rollouts",

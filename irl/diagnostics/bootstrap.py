@@ -25,9 +25,7 @@ def counts(layout: Layout, draws: int, rng: np.random.Generator) -> Int[np.ndarr
     return drawn
 
 
-def correlations(
-    sums: Segments, reference: int, drawn: Int[np.ndarray, "D E"]
-) -> Float[np.ndarray, "D R"]:
+def correlations(sums: Segments, reference: int, drawn: Int[np.ndarray, "D E"]) -> Float[np.ndarray, "D R"]:
     """Pearson's rho of every column with the column `reference`, in every resample; NaN where undefined.
 
     Needs the six moments of each episode only, so a thousand resamples cost one product of matrices.

@@ -45,4 +45,6 @@ def canonical(
         return read(reward, Transitions(start, action, end, flags, flags)).reshape(n, m).mean(1)
 
     own = read(reward, going_on(batch))
-    return own + gamma * mean(ahead, after_ahead) - mean(now, after_now) - gamma * mean(after_now, after_ahead)
+    return (
+        own + gamma * mean(ahead, after_ahead) - mean(now, after_now) - gamma * mean(after_now, after_ahead)
+    )

@@ -1,8 +1,8 @@
 """Rewards drawn at random, to test what a distance sees: shaping it should not, noise it should.
 
-    potential   Phi(s) = w . tanh(W_2 tanh(W_1 z + b_1)),   z the standardised observation
-    shaping     gamma (1 - terminated) Phi(s') - Phi(s),    scaled to a standard deviation
-    noise       the same network of (s, a), scaled alike
+potential   Phi(s) = w . tanh(W_2 tanh(W_1 z + b_1)),   z the standardised observation
+shaping     gamma (1 - terminated) Phi(s') - Phi(s),    scaled to a standard deviation
+noise       the same network of (s, a), scaled alike
 """
 
 from collections.abc import Callable

@@ -50,17 +50,13 @@ def of_steps(name: str, of: Columns, seed: int) -> list[Distance]:
         case "kendall":
             return _kendall(every, of, seed)
         case "erc":
-            return compare(
-                name, segments(of.usable, layout, of.gamma, WHOLE), of, seed, unit="episodes"
-            )
+            return compare(name, segments(of.usable, layout, of.gamma, WHOLE), of, seed, unit="episodes")
         case "starc-val":
             return [replace(d, name=name) for d in val.distances(val.canonical(of, seed), 1, seed)]
         case "npec":
             features = fitted(of.steps.batch.obs.numpy(), stream(seed, "features"))
             left = npec.left_over(of.usable, of.steps, features, of.gamma)
-            return compare(
-                name, Segments(left, layout.episode), of, seed, distance=npec.of_correlation
-            )
+            return compare(name, Segments(left, layout.episode), of, seed, distance=npec.of_correlation)
     raise ValueError(f"no distance of steps is called {name!r}; known: {', '.join(NAMES)}")
 
 

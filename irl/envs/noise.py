@@ -1,7 +1,7 @@
 """Policies made worse on purpose: what a reward says off the expert's path is seen only where something goes.
 
-    box      a + level * half the range of the actions * N(0, 1)
-    choice   with probability `level` a choice at random
+box      a + level * half the range of the actions * N(0, 1)
+choice   with probability `level` a choice at random
 """
 
 import numpy as np

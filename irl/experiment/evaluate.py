@@ -11,19 +11,20 @@ import tyro
 from rich.console import Console
 
 from irl.algorithms.probe import probe
+from irl.algorithms.probe_make import STEPS
 from irl.core import files, records
 from irl.core.config import check_at_least, check_seed, from_json
 from irl.core.errors import UserError
 from irl.core.rng import episode_seeds
 from irl.core.types import Episode
-from irl.demos.load import Demos
 from irl.envs.make import make
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Imitation
 from irl.experiment.draw import drawn_again
 from irl.experiment.judge import finite, judge_drift, judge_reward
+from irl.experiment.probed import Asked, Named, probed
 from irl.experiment.progress import each_episode, progress
-from irl.policies import shelf
+from irl.experiment.references import references_of
 from irl.policies.card import normalised_score, summary
 from irl.policies.policy import Policy, check_policy, load_policy
 from irl.report.html import write_report
@@ -47,9 +48,15 @@ class Evaluate:
     """Folder of Minari datasets; that of the run unless given."""
     policies_root: Path | None = None
     """Where the shelf is; expert_data/policies unless given."""
+    probe: Path | None = None
+    """A probe made by `irl probe`; one is played unless given."""
+    probe_steps: int = STEPS
+    """Steps of each stratum of the probe that is played; numbers of other sizes do not compare."""
+    also: tuple[Named, ...] = ()
+    """Distances to give beside VAL."""
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "episodes")
+        check_at_least(self, 1, "episodes", "probe_steps")
         check_seed(self.seed)
 
 
@@ -76,7 +83,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     torch.set_num_threads(config.threads)
     root = command.datasets_root or config.datasets_root
     demos = drawn_again(config, folder, root)
-    references = _references(config.env_id, demos, command.policies_root)
+    references = references_of(config.env_id, demos, command.policies_root)
     # everything is read before anything is played
     policy, rewards = _read(config.env_id, snapshots)
     episodes = _play(config.env_id, policy, command)
@@ -84,6 +91,9 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     judged = probe(expert, episodes, config.env_id, command.seed)
     steps = list(snapshots)[-1]
     reward = judge_reward(rewards[steps], judged, command.seed)
+    drift = judge_drift(rewards, judged)
+    asked = Asked(command.probe, command.probe_steps, command.also, command.seed, command.policies_root)
+    distances, more = probed(config, demos, snapshots, rewards, asked)
     if not demos.held_out:
         reward["notes"].append("No demonstration is held out: the expert's steps are those trained on.")
     return {
@@ -96,7 +106,8 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "policy": _policy(episodes, references),
         "references": references,
         "reward": reward,
-        "drift": judge_drift(rewards, judged),
+        "distances": distances,
+        "drift": {**drift, **more},
     }
 
 
@@ -160,28 +171,3 @@ def _policy(episodes: Sequence[Episode], references: dict[str, Any]) -> dict[str
         "lengths": list(measured.lengths),
         "seeds": list(measured.episode_seeds),
     }
-
-
-def _references(env_id: str, demos: Demos, policies_root: Path | None) -> dict[str, Any]:
-    """Returns to compare with: from the expert's card, else from the dataset, else unknown."""
-    card = shelf.expert_card(env_id, policies_root)
-    expert = random = None
-    if card is not None:
-        source = f"card of {card.env_id} {card.level}"
-        std = card.measured.return_std
-        expert = {"return_mean": card.measured.return_mean, "return_std": std, "source": source}
-        random = {
-            "return_mean": card.random_return_mean,
-            "return_std": card.random_return_std,
-            "source": source,
-        }
-    else:
-        source = f"dataset {demos.dataset_id}"
-        if demos.expert_return is not None:
-            expert = {"return_mean": demos.expert_return, "return_std": None, "source": source}
-        if demos.random_return is not None:
-            random = {"return_mean": demos.random_return, "return_std": None, "source": source}
-    measured = summary(list(demos.episodes))
-    shown = {"return_mean": finite(measured.return_mean), "return_std": finite(measured.return_std)}
-    shown |= {"episodes": measured.episodes, "source": f"dataset {demos.dataset_id}"}
-    return {"expert": expert, "random": random, "demonstrations": shown}

@@ -48,6 +48,7 @@ def of_task(env_id: str) -> VelocityForm:
         UserError: there is none for it.
     """
     if env_id not in FORMS:
-        raise UserError(f"the reward of {env_id} has no form in velocities; there is one for {', '.join(FORMS)}")
+        raise UserError(
+            f"the reward of {env_id} has no form in velocities; there is one for {', '.join(FORMS)}"
+        )
     return FORMS[env_id]
-
