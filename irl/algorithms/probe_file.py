@@ -5,7 +5,8 @@
     <i>/obs                 episodes after one another, one row more than steps each
     <i>/action, <i>/reward, <i>/terms/<name>, <i>/infos/<name>                 one a step
 
-`i` counts the strata in the order of about.json. qpos and qvel of the state that a step starts from are infos.
+`i` counts the strata in the order of about.json. qpos and qvel of the state that a step starts from are
+infos.
 """
 
 import io

@@ -1,8 +1,8 @@
 """Make a probe: the base of a task, and strata of a run's own policies.
 
-The expert's part is new episodes of the shelf's expert, from resets that no dataset of irl's has: held out from
-every run, whichever demonstrations it drew. Where the shelf has no policy of a middling level, the expert with
-strong action noise stands in for it, and the probe says so.
+The expert's part is new episodes of the shelf's expert, from resets that no dataset of irl's has: held out
+from every run, whichever demonstrations it drew. Where the shelf has no policy of a middling level, the
+expert with strong action noise stands in for it, and the probe says so.
 """
 
 import itertools

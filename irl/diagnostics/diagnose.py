@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float
 
 from irl.core.errors import UserError
@@ -146,7 +147,7 @@ def _cut(steps: Stack, name: str, chosen: Bool[np.ndarray, "N"]) -> Stack:
         stratum=np.zeros(len(length), dtype=np.int64),
         names=(name,),
     )
-    return Stack(steps.batch[np.flatnonzero(chosen)], cut)
+    return Stack(steps.batch[torch.from_numpy(chosen)], cut)
 
 
 def _check_named(named: Sequence[str], truth: RewardFn) -> None:
@@ -162,10 +163,8 @@ def _check_named(named: Sequence[str], truth: RewardFn) -> None:
 
 
 def _line(d: Distance) -> str:
-    if d.n is None:
-        name = d.name
-    else:
-        name = f"{d.name}, whole episodes" if d.n == 0 else f"{d.name}, n = {d.n}"
+    of_segments = {None: "", 0: ", whole episodes"}
+    name = d.name + of_segments.get(d.n, f", n = {d.n}")
     if d.reason:
         return f"{name:<22}{'undefined':>16}  {d.reason}"
     shown = f"{d.value:.3f}" if d.distinguishable is not False else "not distinguishable"

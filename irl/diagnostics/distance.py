@@ -1,6 +1,6 @@
 """How far two rewards are apart: 0 asks for the same, 1 for the opposite.
 
-    D(X, Y) = sqrt((1 - rho(X, Y)) / 2),   X and Y what is left of the rewards once what does not matter is off
+    D(X, Y) = sqrt((1 - rho(X, Y)) / 2),   X, Y what is left of the rewards once what does not matter is off
 
 A distance means little without its own error: `self_error` is the distance that the same computation finds
 between the reference and the reference with random shaping, which asks for the same. One below it says

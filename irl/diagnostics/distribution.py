@@ -2,7 +2,7 @@
 
     w1     E|F_s^-1(U) - F_t^-1(U)| / sigma_s       how far a value moved, in standard deviations of before
     ks     max |F_s - F_t|                          in [0, 1]
-    psi    sum over ten bins of (p - q) log(p / q)  bins of equal mass before; 0.1 and 0.25 are customary limits
+    psi    sum over ten bins of (p - q) log(p / q)  bins of equal mass before; 0.1, 0.25 are usual limits
 
 `aligned` takes offset and scale off first: what is left is a change of shape. Blind to steps that change
 places; distances and rank correlations see those.
@@ -53,12 +53,12 @@ def shift(before: Float[np.ndarray, "N"], after: Float[np.ndarray, "M"]) -> Shif
 def psi(before: Float[np.ndarray, "N"], after: Float[np.ndarray, "M"], bins: int = BINS) -> float:
     """Population stability index over bins that hold equal shares of `before`."""
     edges = np.unique(np.quantile(before, np.linspace(0, 1, bins + 1)[1:-1]))
-    p, q = (
-        np.maximum(
-            np.bincount(np.searchsorted(edges, x, side="right"), minlength=len(edges) + 1) / len(x), LEAST
-        )
-        for x in (before, after)
-    )
+
+    def shares(values: Float[np.ndarray, "K"]) -> Float[np.ndarray, "_"]:
+        place = np.searchsorted(edges, values, side="right")
+        return np.maximum(np.bincount(place, minlength=len(edges) + 1) / len(values), LEAST)
+
+    p, q = shares(before), shares(after)
     return float(np.sum((q - p) * np.log(q / p)))
 
 

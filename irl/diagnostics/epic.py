@@ -6,8 +6,8 @@
 The expectations are means over one set of M pairs (a_j, s_j), whose states double as those of S: shared by
 every term, they take a potential off exactly, however few they are.
 
-It asks for the reward of steps that no simulator makes, (s, a, S') with S' from anywhere, so the reward has to
-be a function of (s, a, s'): the hand-written ones of MuJoCo are not, their form in velocities is
+It asks for the reward of steps that no simulator makes, (s, a, S') with S' from anywhere, so the reward has
+to be a function of (s, a, s'): the hand-written ones of MuJoCo are not, their form in velocities is
 (`irl.rewards.velocity`). It knows no end of an episode: every step is taken as one that goes on.
 
 Source: Gleave et al. (2021), arXiv:2006.13900.

@@ -1,7 +1,8 @@
 """How a discriminator fares: on the demonstrations it learned from, on others, and on fresh policy steps.
 
-D = sigmoid(logit), expert = label 1, both classes at half the weight. A discriminator that is far better on the
-demonstrations it was trained on than on held-out ones knows them by heart, and its reward pays for being them.
+D = sigmoid(logit), expert = label 1, both classes at half the weight. A discriminator that is far better on
+the demonstrations it was trained on than on held-out ones knows them by heart, and its reward pays for being
+them.
 """
 
 import math

@@ -2,8 +2,8 @@
 
     survival bias   b = E[r] / (|E[r]| + sigma)
 
-Near 1 each step pays much the same and something, so staying alive is what is learned where an episode can end
-early; near -1 each step costs, and ending it is.
+Near 1 each step pays much the same and something, so staying alive is what is learned where an episode can
+end early; near -1 each step costs, and ending it is.
 """
 
 from dataclasses import dataclass

@@ -3,8 +3,8 @@
     min over lambda >= 0, c, theta of |lambda R + c + gamma Phi(s') - Phi(s) - R'|  /  the same at lambda = 0
 
 Phi(s) = phi(s) . theta in the span of the features, 0 after a termination. 0: R' is R up to scale, offset and
-shaping; 1: R says nothing of R'. With potentials of that span the minimum is one regression: with X and X' what
-offset and potentials leave of R and R', the ratio is sqrt(1 - max(rho(X, X'), 0)^2).
+shaping; 1: R says nothing of R'. With potentials of that span the minimum is one regression: with X and X'
+what offset and potentials leave of R and R', the ratio is sqrt(1 - max(rho(X, X'), 0)^2).
 
 Differs from the paper: a span in place of a network, so the minimum is exact and needs no training; the
 norm is the root mean square, in which the distance is the same both ways.

@@ -8,13 +8,15 @@
     npec       the nearest reward that asks for the same
     epic       potentials averaged away over invented steps      needs a reward of (s, a, s')
 
-Source: Gleave et al. (2021), arXiv:2006.13900, for ERC, NPEC and EPIC; Skalse et al. (2024), arXiv:2309.15257.
+Source: Gleave et al. (2021), arXiv:2006.13900, for ERC, NPEC and EPIC; for VAL Skalse et al. (2024),
+arXiv:2309.15257.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import torch
 from jaxtyping import Float
 from scipy.stats import rankdata
 
@@ -70,8 +72,8 @@ def of_functions(
     Cost: 3 size^2 rewards of each; the self-tests are taken over fewer.
     """
     batch, rng = of.steps.batch, stream(seed, "epic")
-    rows = np.sort(rng.permutation(len(batch))[:size])
-    states, actions = rng.permutation(len(batch))[:size], rng.permutation(len(batch))[:size]
+    rows, states, actions = (torch.from_numpy(rng.permutation(len(batch))[:size]) for _ in range(3))
+    rows = rows.sort().values
     samples = replace(batch[states], action=batch.action[actions])
 
     def left(reward: RewardFn, n: int) -> Float[np.ndarray, "B"]:
@@ -83,7 +85,7 @@ def of_functions(
     tested = [*(own + shaping for shaping in random[:SHAPINGS]), -own, random[SHAPINGS]]
     tests = [pearson_distance(own, values) for values in tested]
     values = np.column_stack([left(reward, len(rows)) for reward in (truth, *rewards)])
-    return compare("epic", Segments(values, of.steps.layout.episode[rows]), of, seed, tests=tests)
+    return compare("epic", Segments(values, of.steps.layout.episode[rows.numpy()]), of, seed, tests=tests)
 
 
 def _kendall(every: Segments, of: Columns, seed: int) -> list[Distance]:

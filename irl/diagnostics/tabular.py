@@ -1,7 +1,7 @@
 """The canonical forms of rewards on a finite MDP, exact: a reward is an array R[s, a, s'].
 
-What the sampled distances are held against, and of use by themselves where a task is small. T[s, a, s'] is the
-probability of s' after a in s, pi[s, a] that of a in s.
+What the sampled distances are held against, and of use by themselves where a task is small. T[s, a, s'] is
+the probability of s' after a in s, pi[s, a] that of a in s.
 """
 
 import numpy as np

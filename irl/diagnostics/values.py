@@ -5,7 +5,10 @@
 
 w is the least-squares fixed point: V is the value of r under the policies that made the steps. It is linear
 in r, so delta of a r + b r' is a delta + b delta', and of a potential's shaping in the span of phi it is 0.
-Features that say the same make A singular; it is solved in three steps w <- w + (A + lambda N I)^-1 (P^T r - A w),
+Features that say the same make A singular; it is solved in three steps
+
+    w <- w + (A + lambda N I)^-1 (P^T r - A w)
+
 which leave out what is smaller than lambda and are exact to rounding for the rest.
 The weights used on one half of the episodes are fitted to the other, or noise would be fitted away.
 

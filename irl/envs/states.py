@@ -29,7 +29,6 @@ class StateRecorder(gym.Wrapper):
         """By name `qpos_0`, `qpos_1`, ..., `qvel_0`, ..., of this episode so far."""
         if not self._states:
             return {}
-        parts = {
-            name: np.array(rows) for name, rows in zip(("qpos", "qvel"), zip(*self._states, strict=True))
-        }
+        qpos, qvel = zip(*self._states, strict=True)
+        parts = {"qpos": np.array(qpos), "qvel": np.array(qvel)}
         return {f"{name}_{i}": rows[:, i] for name, rows in parts.items() for i in range(rows.shape[1])}

@@ -127,7 +127,8 @@ def _health(snapshot: Snapshot, played: Played, fresh: Sequence[Episode]) -> dic
         found["memorised"] = finite(on_train.auroc - on_held_out.auroc)
     expert = played.held_out if played.held_out is not None else played.train
     both = [expert, policy]
-    slopes = np.concatenate([steepness(snapshot.logits, part[_some(len(part), STEEP // 2)]) for part in both])
+    thinned = [part[torch.from_numpy(_some(len(part), STEEP // 2))] for part in both]
+    slopes = np.concatenate([steepness(snapshot.logits, part) for part in thinned])
     found["slope_mean"] = finite(float(np.mean(slopes)))
     found["slope_p99"] = finite(float(np.quantile(slopes, 0.99)))
     found["label_prior"] = 0.5
@@ -171,11 +172,8 @@ def _normaliser(snapshots: Mapping[int, Snapshot], steps: Stack) -> dict[str, An
     """
     every = list(snapshots.values())
     first = every[0].reward.net.normaliser
-    same = all(
-        torch.equal(first.mean, s.reward.net.normaliser.mean)
-        and torch.equal(first.var, s.reward.net.normaliser.var)
-        for s in every
-    )
+    others = [s.reward.net.normaliser for s in every]
+    same = all(torch.equal(first.mean, n.mean) and torch.equal(first.var, n.var) for n in others)
     if same:
         return {"moved": False, "frozen": None}
     frozen = [read(s.normalised_by(first).reward, steps.batch) for s in every]

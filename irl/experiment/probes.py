@@ -76,8 +76,8 @@ def base_of(env_id: str, policies_root: Path | None, held_out: Sequence[Episode]
     expert, medium = (_shelved(env_id, level, policies_root) for level in ("expert", "medium"))
     if expert is None and not held_out:
         raise UserError(
-            f"a probe needs play of an expert, and the shelf has none of {env_id}; train one with: irl experts "
-            f"train --env-id {env_id}"
+            f"a probe needs play of an expert, and the shelf has none of {env_id}; train one with: irl "
+            f"experts train --env-id {env_id}"
         )
     total = len(BASE) * steps
     with progress("probe", total) as report:

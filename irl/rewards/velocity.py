@@ -3,9 +3,9 @@
     recorded    (x' - x) / dt + ...          x is not in the observation
     this form   (v + v') / 2  + ...          v the velocity along x, which is
 
-Both ends' mean is the displacement to second order. Velocities that the observation clips are clipped here, and
-nothing else differs but what the row says. For distances that invent steps (EPIC), and to say how near the two
-forms are: 0.003 by the default distance on HalfCheetah.
+Both ends' mean is the displacement to second order. Velocities that the observation clips are clipped here,
+and nothing else differs but what the row says. For distances that invent steps (EPIC), and to say how near
+the two forms are: 0.003 by the default distance on HalfCheetah.
 """
 
 from dataclasses import dataclass
