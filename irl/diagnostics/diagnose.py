@@ -98,7 +98,8 @@ def diagnose(
     of = compare.columns(own, learned[:, None], steps, gamma, seed)
     left = val.canonical(of, seed)
     curve = tuple(val.distances(left, n, seed)[0] for n in ns)
-    headline = val.headline(curve)
+    n = val.longest(steps.layout, ns)
+    headline = next((d for d in curve if d.n == n), None) or val.distances(left, n, seed)[0]
     found = tuple(
         references.of_functions(truth, [reward], of, seed)[0]
         if name == "epic"
@@ -109,9 +110,9 @@ def diagnose(
     return Diagnosis(
         headline=headline,
         curve=curve,
-        uncentred=val.uncentred(left, headline.n or 1)[0] if ends else None,
+        uncentred=val.uncentred(left, n)[0] if ends else None,
         references=found,
-        strata={name: within(left, name, headline.n or 1, seed) for name in steps.layout.names},
+        strata={name: within(left, name, n, seed) for name in steps.layout.names},
         steps=len(steps.batch),
         episodes=len(steps.layout.length),
         gamma=gamma,

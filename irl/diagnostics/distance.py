@@ -18,7 +18,7 @@ from jaxtyping import Float
 from irl.core import statistics
 
 NAN = float("nan")
-LEFT = 1e-5
+LEFT = 3e-5
 """A reward of which less than this share is left once its value function is off has nothing left."""
 
 

@@ -24,6 +24,7 @@ from irl.diagnostics.compare import Columns, compare
 from irl.diagnostics.distance import Distance, cosine_distance
 from irl.diagnostics.features import fitted
 from irl.diagnostics.segments import WHOLE, segments
+from irl.diagnostics.stack import Layout
 from irl.diagnostics.values import td_errors
 
 CURVE = (1, 10, 50, 100, WHOLE)
@@ -57,11 +58,14 @@ def distances(of: Canonical, n: int, seed: int) -> list[Distance]:
     return compare("VAL", segments(of.errors, c.steps.layout, c.gamma, n), c, seed, n, "segments")
 
 
-def headline(of: Sequence[Distance]) -> Distance:
-    """Of one reward's curve the one at n = 50, or the longest below that its episodes have room for."""
-    fit = [d for d in of if d.n is not None and 0 < d.n <= HEADLINE]
-    known = [d for d in fit if d.reason is None]
-    return max(known or fit, key=lambda d: d.n or 0)
+def longest(layout: Layout, ns: Sequence[int] = CURVE) -> int:
+    """The longest of `ns` up to 50 that at least half of the episodes have room for; 1 where none is."""
+    fits = [n for n in ns if 0 < n <= HEADLINE and _room(layout, n) >= 0.5]
+    return max(fits, default=1)
+
+
+def _room(layout: Layout, n: int) -> float:
+    return float(np.mean(layout.terminated | (layout.length >= n)))
 
 
 def uncentred(of: Canonical, n: int) -> list[float]:

@@ -24,7 +24,7 @@ from scipy.linalg import lu_factor, lu_solve
 
 from irl.diagnostics.stack import Stack
 
-RIDGE = 1e-6
+RIDGE = 1e-9
 """Lambda, for features of size 1."""
 SOLVES = 3
 ROWS = 8192
@@ -52,6 +52,7 @@ def td_errors(
         raise ValueError(f"{len(rewards)} rewards of {len(steps.batch)} steps at gamma = {gamma}")
     fold = steps.layout.fold[steps.layout.episode]
     halves = sorted(set(fold.tolist()))
+    rewards = _anchored(rewards, steps, gamma)
     weights = {half: _weights(rewards, steps, fold == half, features, gamma, ridge) for half in halves}
     errors = np.empty(rewards.shape, dtype=np.float64)
     for half in halves:
@@ -60,6 +61,18 @@ def td_errors(
         for part, now, ahead in in_parts(steps, rows, features):
             errors[part] = rewards[part] + (gamma * ahead - now) @ other
     return errors
+
+
+def _anchored(rewards: Float[np.ndarray, "N R"], steps: Stack, gamma: float) -> Float[np.ndarray, "N R"]:
+    """The rewards with the constant potential on them that takes their mean off.
+
+        r + gamma (1 - terminated) k - k,   k = mean of r / (1 - gamma)
+
+    Shaping, so that delta stays what it is; but exact, where the solve would leave some of a large offset.
+    """
+    ended = steps.batch.terminated.numpy()[:, None]
+    mean = np.mean(rewards, axis=0, where=~ended) if not ended.all() else np.zeros(rewards.shape[1])
+    return rewards - mean * np.where(ended, 1.0 / (1.0 - gamma), 1.0)
 
 
 def _weights(

@@ -35,6 +35,8 @@ from irl.rewards.mujoco import HandWritten
 
 RANKED = 2000
 """Evenly spaced steps that ranks are compared on: Kendall's tau sorts."""
+SHIFTED = 10_000
+"""Evenly spaced steps that distributions are compared on."""
 STEEP = 2000
 """Steps whose gradient is taken."""
 
@@ -98,7 +100,7 @@ def _where(columns: Float[np.ndarray, "N S"], steps: Stack, gamma: float, seed: 
     truth = read(HandWritten(), steps.batch)
     of = compare.columns(truth, columns, steps, gamma, seed)
     left = val.canonical(of, seed)
-    n = val.headline([val.distances(left, n, seed)[0] for n in (50, 10, 1)]).n or 1
+    n = val.longest(steps.layout)
     sums = segments(left.errors, steps.layout, gamma, n)
     asked = slice(1, 1 + of.asked)
     moved = trajectory(sums.values[:, asked], sums.values[:, 0], np.max(np.abs(of.usable[:, asked]), axis=0))
@@ -143,11 +145,14 @@ def _logits(snapshot: Snapshot, batch: Transitions) -> Float[np.ndarray, "B"]:
 def _shift(before: np.ndarray, after: np.ndarray, steps: Stack) -> dict[str, Any]:
     """How the values moved, over all and by stratum, and how their order did."""
     some = _some(len(before), RANKED)
+    most = _some(len(before), SHIFTED)
+    stratum = steps.layout.stratum[steps.layout.episode][most]
+    old, new = before[most], after[most]
     strata = {
-        name: _plain(asdict(shift(before[steps.of(name)], after[steps.of(name)])))
-        for name in steps.layout.names
+        name: _plain(asdict(shift(old[stratum == i], new[stratum == i])))
+        for i, name in enumerate(steps.layout.names)
     }
-    return _plain(asdict(shift(before, after))) | {
+    return _plain(asdict(shift(old, new))) | {
         "spearman": finite(statistics.spearman(before, after)),
         "kendall": finite(statistics.kendall(before[some], after[some])),
         "pair_flips": finite(pair_flips(before[some], after[some])),

@@ -62,9 +62,9 @@ _COLUMNS = (
 )
 
 DISTANCES = (
-    "0 asks for the same, 1 for the opposite. own error: what the computation finds between the hand-written "
-    "reward and itself with random shaping; a distance below it is not distinguishable. random: what it finds "
-    "for a random network. The interval is over episodes."
+    "0 asks for the same, 1 for the opposite. own error: what the computation finds between the "
+    "hand-written reward and itself with random shaping; a distance below it is not distinguishable. "
+    "random: what it finds for a random network. The interval is over episodes."
 )
 DRIFT = (
     "to truth, moved: VAL distance to the hand-written reward and from the snapshot before; shape: share of "

@@ -32,14 +32,14 @@ def test_the_opposite_is_one_and_noise_between() -> None:
 
 def test_the_self_tests_are_what_they_say() -> None:
     found = diagnose(lambda b: -b.next_obs.abs().sum(1), true, STRATA, ns=SHORT).headline
-    assert found.self_error < 0.1 < found.value < 0.5
+    assert found.self_error < 0.06 < found.value < 0.5
     assert found.negation == pytest.approx(1)
     assert 0.3 < found.random < 0.95
     assert found.low <= found.value <= found.high
 
 
 def test_a_reward_right_near_the_expert_alone_is_caught_by_other_play() -> None:
-    near = {"expert": [episode for episode in play(30)["expert"] if np.abs(episode.obs[0]).max() < 0.25]}
+    near = {"expert": [episode for episode in play(60)["expert"] if np.abs(episode.obs[0]).max() < 0.2]}
     assert len(near["expert"]) > 1
     assert value(mirage, near) < 0.01
     found = diagnose(mirage, true, STRATA, ns=SHORT)
