@@ -6,8 +6,8 @@ Shaping and positive scale do not count, an offset only where episodes end early
 STARC with VAL does; longer segments forgive what the features of V cannot express, because in a sum the
 potentials cancel but for the first and the last. n = 50 is the headline; the curve over n is shown with it.
 
-EPIC and DARD compare what is left of (x' - x) / dt once potentials are off, a hundredth of it at gamma = .99:
-on MuJoCo they find running backwards next to running forwards.
+MuJoCo's forward reward (x' - x) / dt is a difference of potentials itself. With x in the state DARD keeps a
+hundredth of it at gamma = .99 and finds running backwards next to running forwards; here x is no feature.
 
 Source: Skalse et al. (2024), arXiv:2309.15257 (VAL). The segments, the fitted V and the Pearson distance in
 place of a norm are ours.
