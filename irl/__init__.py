@@ -13,7 +13,6 @@ from irl.algorithms.probe_file import load_probe
 from irl.core.errors import UserError
 from irl.core.types import Episode, RewardFn, Transitions, concatenate, from_episodes
 from irl.demos.load import Demos, load_demos
-from irl.diagnostics.diagnose import diagnose
 from irl.envs.rollouts import rollout, rollouts
 from irl.policies.policy import Policy, load_policy
 from irl.policies.shelf import find as load_expert
@@ -22,6 +21,7 @@ from irl.rewards.mujoco import HandWritten
 from irl.rewards.wrapper import RewardWrapper
 
 if TYPE_CHECKING:
+    from irl.diagnostics.diagnose import diagnose
     from irl.learners.reward_vec import RewardVecWrapper
 
 __all__ = [
@@ -48,8 +48,11 @@ __all__ = [
 ]
 
 
+# Stable-Baselines3 and scipy take seconds to import, and only these names need them
+_LATER = {"RewardVecWrapper": "irl.learners.reward_vec", "diagnose": "irl.diagnostics.diagnose"}
+
+
 def __getattr__(name: str) -> Any:
-    # Stable-Baselines3 takes seconds to import, and only this name needs it
-    if name == "RewardVecWrapper":
-        return import_module("irl.learners.reward_vec").RewardVecWrapper
+    if name in _LATER:
+        return getattr(import_module(_LATER[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

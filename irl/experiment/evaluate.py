@@ -1,5 +1,6 @@
 """`irl evaluate`: the policy and the reward of a run in numbers, and one page to look at."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,11 +65,15 @@ def evaluate(command: Evaluate) -> None:
     """Evaluate, write, print."""
     folder = records.open_run(command.run)
     files.check_writable(target := folder.path / "evaluation.json")
+    began = time.monotonic()
     result = evaluation(folder, command)
     files.write_json(target, result)
     report = write_report(folder.path)
     console = Console()
     console.print(evaluation_table(result))
+    if cost := result["drift"].get("cost"):
+        asked = f"{cost['rewards']:,} rewards were asked for"
+        console.print(f"judged in {time.monotonic() - began:.0f} s; {asked}", highlight=False)
     console.print(f"report: {report}", highlight=False, markup=False, soft_wrap=True)
 
 
@@ -85,7 +90,8 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     demos = drawn_again(config, folder, root)
     references = references_of(config.env_id, demos, command.policies_root)
     # everything is read before anything is played
-    policy, rewards = _read(config.env_id, snapshots)
+    policies, rewards = _read(config.env_id, snapshots)
+    policy = policies[max(policies)]
     episodes = _play(config.env_id, policy, command)
     expert = demos.held_out or demos.episodes
     judged = probe(expert, episodes, config.env_id, command.seed)
@@ -93,7 +99,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     reward = judge_reward(rewards[steps], judged, command.seed)
     drift = judge_drift(rewards, judged)
     asked = Asked(command.probe, command.probe_steps, command.also, command.seed, command.policies_root)
-    distances, more = probed(config, demos, snapshots, rewards, asked)
+    distances, more = probed(config, demos, policies, rewards, asked)
     if not demos.held_out:
         reward["notes"].append("No demonstration is held out: the expert's steps are those trained on.")
     return {
@@ -111,22 +117,22 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     }
 
 
-def _read(env_id: str, snapshots: Mapping[int, Path]) -> tuple[Policy, dict[int, LearnedReward]]:
-    """The policy of the last snapshot and the reward of each.
+def _read(env_id: str, snapshots: Mapping[int, Path]) -> tuple[dict[int, Policy], dict[int, LearnedReward]]:
+    """The policy and the reward of each snapshot.
 
     Raises:
         UserError: a file is missing or damaged, or of another task.
     """
-    policy = load_policy(list(snapshots.values())[-1] / "policy.safetensors")
+    policies = {steps: load_policy(path / "policy.safetensors") for steps, path in snapshots.items()}
     rewards = {steps: load_reward(path) for steps, path in snapshots.items()}
     env = make(env_id)
     try:
-        check_policy(policy, env)
         for steps, reward in rewards.items():
-            _check_reward(reward, env_id, policy, snapshots[steps])
+            check_policy(policies[steps], env)
+            _check_reward(reward, env_id, policies[steps], snapshots[steps])
     finally:
         env.close()
-    return policy, rewards
+    return policies, rewards
 
 
 def _check_reward(reward: LearnedReward, env_id: str, policy: Policy, path: Path) -> None:

@@ -22,7 +22,7 @@ from irl.experiment.logits import LOG_PI_BOUND, Snapshot
 from irl.experiment.probes import base_of, given, own_of
 from irl.experiment.progress import progress
 from irl.policies import shelf
-from irl.policies.policy import Policy, load_policy
+from irl.policies.policy import Policy
 from irl.rewards.artefact import LearnedReward
 
 Named = Literal["pearson", "spearman", "kendall", "erc", "starc-val", "npec", "epic"]
@@ -45,7 +45,7 @@ class Asked:
 def probed(
     config: Imitation,
     demos: Demos,
-    snapshots: Mapping[int, Path],
+    policies: Mapping[int, Policy],
     rewards: Mapping[int, LearnedReward],
     asked: Asked,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -54,7 +54,7 @@ def probed(
     Where demonstrations have no actions and the shelf no expert there is nothing to compare on: a reason.
 
     Raises:
-        UserError: the probe that was given is of another task, or a policy is damaged.
+        UserError: the probe that was given is of another task, or damaged.
     """
     expert = demos.held_out or demos.episodes
     actions = demos[0].action.shape[1] > 0
@@ -66,23 +66,22 @@ def probed(
     else:
         probe = base_of(config.env_id, asked.policies_root, expert, asked.steps)
     own = {name: episodes for name, episodes in probe.items() if name not in probe.base}
-    base, own = probe.base, own or dict(own_of(config.env_id, snapshots, asked.steps))
+    base, own = probe.base, own or dict(own_of(config.env_id, policies, asked.steps))
     reward = rewards[max(rewards)]
     distances = judge_distances(reward, base, own, asked.also, asked.seed)
-    return distances, _drift(config, demos, snapshots, rewards, base, asked)
+    return distances, _drift(config, demos, policies, rewards, base, asked)
 
 
 def _drift(
     config: Imitation,
     demos: Demos,
-    snapshots: Mapping[int, Path],
+    policies: Mapping[int, Policy],
     rewards: Mapping[int, LearnedReward],
     base: ProbeSet,
     asked: Asked,
 ) -> dict[str, Any]:
     settings = config.discriminator
     bound = settings.log_pi_bound if isinstance(settings, AIRLConfig) else LOG_PI_BOUND
-    policies = {at: load_policy(path / "policy.safetensors") for at, path in snapshots.items()}
     both = {at: Snapshot(rewards[at], policies[at], bound) for at in rewards}
     total = 3 * len(both) + 1
     with progress("drift", total) as report:

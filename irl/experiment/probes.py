@@ -54,7 +54,7 @@ def make_probe(command: Probe) -> None:
     files.check_writable(out)
     probe = base_of(env_id, command.policies_root, (), command.steps)
     if folder is not None:
-        own = own_of(env_id, folder.snapshots(), command.steps)
+        own = own_of(env_id, policies_of(env_id, folder.snapshots()), command.steps)
         probe = ProbeSet(env_id, {**probe, **own}, {**probe.about, **own.about})
     save_probe(probe, out)
     console = Console()
@@ -84,21 +84,30 @@ def base_of(env_id: str, policies_root: Path | None, held_out: Sequence[Episode]
         return base_probe(env_id, expert, medium, held_out, steps, each_step(report, total))
 
 
-def own_of(env_id: str, snapshots: Mapping[int, Path], steps: int) -> ProbeSet:
-    """Strata of a run's own policies at 0, 25, 50, 75 and 100 % of it, played now."""
+def own_of(env_id: str, policies: Mapping[int, Policy], steps: int) -> ProbeSet:
+    """Strata of a run's policies, by step, at 0, 25, 50, 75 and 100 % of it, played now."""
+    shown = {share: policies[step] for share, step in at_shares(list(policies)).items()}
+    total = len(shown) * steps
+    with progress("the run's policies", total) as report:
+        return own_strata(env_id, shown, steps, each_step(report, total))
+
+
+def policies_of(env_id: str, snapshots: Mapping[int, Path]) -> dict[int, Policy]:
+    """The policy of each snapshot, by step.
+
+    Raises:
+        UserError: there is none, or one is damaged or of another task.
+    """
     if not snapshots:
         raise UserError("the run has no snapshot yet; its policies are taken as it goes on")
-    at = at_shares(list(snapshots))
-    policies = {share: load_policy(snapshots[step] / "policy.safetensors") for share, step in at.items()}
+    policies = {step: load_policy(path / "policy.safetensors") for step, path in snapshots.items()}
     env = make(env_id)
     try:
         for policy in policies.values():
             check_policy(policy, env)
     finally:
         env.close()
-    total = len(policies) * steps
-    with progress("the run's policies", total) as report:
-        return own_strata(env_id, policies, steps, each_step(report, total))
+    return policies
 
 
 def given(path: Path, env_id: str) -> ProbeSet:
