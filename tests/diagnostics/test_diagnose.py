@@ -27,12 +27,13 @@ def test_scale_offset_and_shaping_do_not_count() -> None:
 
 def test_the_opposite_is_one_and_noise_between() -> None:
     assert value(lambda b: -true(b)) == pytest.approx(1)
-    assert 0.3 < value(lambda b: (97 * b.action[:, 0]).sin()) < 0.9
+    # the same in the mean wherever one is
+    assert 0.5 < value(lambda b: (1e4 * b.obs[:, 0]).sin()) < 0.9
 
 
 def test_the_self_tests_are_what_they_say() -> None:
     found = diagnose(lambda b: -b.next_obs.abs().sum(1), true, STRATA, ns=SHORT).headline
-    assert found.self_error < 0.06 < found.value < 0.5
+    assert found.self_error < 0.04 < found.value < 0.5
     assert found.negation == pytest.approx(1)
     assert 0.3 < found.random < 0.95
     assert found.low <= found.value <= found.high
@@ -81,7 +82,7 @@ def test_a_named_distance_of_a_reward_to_itself_is_zero_and_to_its_negation_one(
 def test_shaping_counts_for_some_and_not_for_others() -> None:
     names = ("pearson", "npec", "epic")
     pearson, npec, epic = diagnose(shaped(3.0), true, STRATA, ns=(1,), named=names).references
-    assert pearson.value > 0.2
+    assert pearson.value > 0.15
     assert npec.value < 1e-4
     # a termination has no potential after it, and EPIC knows none: here there is none
     assert epic.value < 1e-4
