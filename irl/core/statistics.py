@@ -50,7 +50,8 @@ def kendall(a: Float[np.ndarray, "N"], b: Float[np.ndarray, "N"]) -> float:
     """
     if not _comparable(a, b):
         return float("nan")
-    return float(kendalltau(a, b).statistic)
+    tau, _ = kendalltau(a, b)
+    return float(tau)
 
 
 def auroc(positive: Float[np.ndarray, "P"], negative: Float[np.ndarray, "N"]) -> float:

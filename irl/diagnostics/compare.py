@@ -11,12 +11,11 @@ import numpy as np
 from jaxtyping import Float
 
 from irl.core.rng import stream
-from irl.core.types import RewardFn
 from irl.diagnostics import bootstrap
 from irl.diagnostics.distance import NAN, Distance, of_correlation, pearson_distance, why_undefined
 from irl.diagnostics.random_rewards import noise, shaping
 from irl.diagnostics.segments import Segments
-from irl.diagnostics.stack import Stack, read
+from irl.diagnostics.stack import Given, Stack, read
 
 SHAPINGS = 3
 """Random shapings that the invariance test takes the worst of."""
@@ -54,7 +53,7 @@ def columns(
     return Columns(raw, steps, gamma, rewards.shape[1])
 
 
-def tests_of(truth: Float[np.ndarray, "N"], steps: Stack, gamma: float, seed: int) -> list[RewardFn]:
+def tests_of(truth: Float[np.ndarray, "N"], steps: Stack, gamma: float, seed: int) -> list[Given]:
     """Random shapings as large as `truth`, and a random reward."""
     rng, std = stream(seed, "self tests"), float(np.std(truth)) if np.all(np.isfinite(truth)) else 1.0
     random = [shaping(steps.batch, gamma, std, rng) for _ in range(SHAPINGS)]
@@ -89,16 +88,20 @@ def compare(
 
     if tests is None:
         tests = [NAN if reasons[0] else measured(i) for i in range(1 + of.asked, of.raw.shape[1])]
+    fewest = np.min(np.bincount(of.steps.layout.stratum))
     found = []
     for i in range(1, 1 + of.asked):
         reason = reasons[0] or reasons[i]
-        low, high = bootstrap.interval(np.array([distance(value) for value in rho[:, i]]))
+        # one episode of a kind cannot be drawn otherwise: an interval would leave its chance out
+        low, high = NAN, NAN
+        if fewest > 1 and reason is None:
+            low, high = bootstrap.interval(np.array([distance(value) for value in rho[:, i]]))
         found.append(
             Distance(
                 name=name,
                 value=NAN if reason else measured(i),
-                low=NAN if reason else low,
-                high=NAN if reason else high,
+                low=low,
+                high=high,
                 self_error=max(tests[:SHAPINGS]),
                 negation=tests[SHAPINGS],
                 random=tests[SHAPINGS + 1],

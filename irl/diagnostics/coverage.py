@@ -20,17 +20,20 @@ INSIDE = 0.99
 
 
 def outside(probe: Transitions, new: Transitions) -> float:
-    """The share of new steps (s, a) that lie outside the probe; about 0.01 of steps like its own."""
+    """The share of new steps (s, a) that lie outside the probe; about 0.01 of steps like its own.
+
+    NaN where the probe has too few to have neighbours.
+    """
     there, steps = _thinned(_seen(probe)), _thinned(_seen(new))
     mean, std = np.mean(there, axis=0), np.std(there, axis=0)
     std = np.where(std < MIN_STD, 1.0, std)
     there, steps = (there - mean) / std, (steps - mean) / std
-    tree = KDTree(there)
-    k = min(NEIGHBOURS, len(there) - 1)
-    if k < 1:
+    if len(there) <= NEIGHBOURS:
         return float("nan")
-    own = tree.query(there, k=[k + 1])[0][:, 0]
-    return float(np.mean(tree.query(steps, k=[k])[0][:, 0] > np.quantile(own, INSIDE)))
+    tree = KDTree(there)
+    own, _ = tree.query(there, k=NEIGHBOURS + 1)
+    new_ones, _ = tree.query(steps, k=NEIGHBOURS)
+    return float(np.mean(new_ones[:, -1] > np.quantile(own[:, -1], INSIDE)))
 
 
 def _seen(batch: Transitions) -> Float[np.ndarray, "B I"]:

@@ -16,16 +16,16 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from irl.core.types import RewardFn, Transitions
+from irl.core.types import Transitions
 from irl.diagnostics.epic import going_on
-from irl.diagnostics.stack import read
+from irl.diagnostics.stack import Given, read
 
 Dynamics = Callable[[Tensor, Tensor], Tensor]
 """Next observations of observations and actions, one draw a row: a simulator or a learned model."""
 
 
 def canonical(
-    reward: RewardFn,
+    reward: Given,
     batch: Transitions,
     actions: Float[Tensor, "M A"],
     dynamics: Dynamics,

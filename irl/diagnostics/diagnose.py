@@ -12,10 +12,10 @@ import torch
 from jaxtyping import Bool, Float
 
 from irl.core.errors import UserError
-from irl.core.types import Episode, RewardFn
+from irl.core.types import Episode
 from irl.diagnostics import compare, references, val
 from irl.diagnostics.distance import Distance
-from irl.diagnostics.stack import Stack, read, stack
+from irl.diagnostics.stack import Given, Stack, read, stack
 from irl.rewards.mujoco import HandWritten
 
 FEW_EPISODES = 5
@@ -66,8 +66,8 @@ class Diagnosis:
 
 
 def diagnose(
-    reward: RewardFn,
-    truth: RewardFn,
+    reward: Given,
+    truth: Given,
     probe: Mapping[str, Sequence[Episode]] | Sequence[Episode],
     *,
     gamma: float = 0.99,
@@ -151,7 +151,7 @@ def _cut(steps: Stack, name: str, chosen: Bool[np.ndarray, "N"]) -> Stack:
     return Stack(steps.batch[torch.from_numpy(chosen)], cut)
 
 
-def _check_named(named: Sequence[str], truth: RewardFn) -> None:
+def _check_named(named: Sequence[str], truth: Given) -> None:
     if unknown := sorted(set(named) - set(references.NAMES)):
         raise UserError(
             f"no distance is called {', '.join(unknown)}; choose of {', '.join(references.NAMES)}"

@@ -31,7 +31,7 @@ class Distance:
     """In [0, 1]; NaN, with a reason, where it is undefined."""
     low: float = NAN
     high: float = NAN
-    """95 % interval over episodes."""
+    """95 % interval over episodes; NaN where a kind of play has only one."""
     self_error: float = NAN
     """Invariance: of the reference to itself with random shaping as large as itself; ideally 0."""
     negation: float = NAN

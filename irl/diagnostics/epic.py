@@ -19,15 +19,15 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from irl.core.types import RewardFn, Transitions
-from irl.diagnostics.stack import read
+from irl.core.types import Transitions
+from irl.diagnostics.stack import Given, read
 
 ROWS = 65_536
 """Invented steps that the reward is asked for at a time."""
 
 
 def canonical(
-    reward: RewardFn, batch: Transitions, samples: Transitions, gamma: float
+    reward: Given, batch: Transitions, samples: Transitions, gamma: float
 ) -> Float[np.ndarray, "B"]:
     """C(R) of each step of `batch`.
 
@@ -45,7 +45,7 @@ def canonical(
 
 
 def mean_reward(
-    reward: RewardFn, states: Float[torch.Tensor, "B O"], samples: Transitions
+    reward: Given, states: Float[torch.Tensor, "B O"], samples: Transitions
 ) -> Float[np.ndarray, "B"]:
     """1/M sum over j of R(x, a_j, s_j), for each state x."""
     m = len(samples)
@@ -54,9 +54,7 @@ def mean_reward(
     return np.concatenate(means)
 
 
-def _means(
-    reward: RewardFn, states: Float[torch.Tensor, "C O"], samples: Transitions
-) -> Float[np.ndarray, "C"]:
+def _means(reward: Given, states: Float[torch.Tensor, "C O"], samples: Transitions) -> Float[np.ndarray, "C"]:
     n, m = len(states), len(samples)
     flags = torch.zeros(n * m, dtype=torch.bool)
     invented = Transitions(

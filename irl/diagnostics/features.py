@@ -16,7 +16,9 @@ from jaxtyping import Float
 
 from irl.core.nets import MIN_STD
 
-WAVES = 128
+WAVES, STEPS_A_WAVE = 128, 50
+"""Random waves at most, and how many steps there must be for each: a value function fitted to few steps with
+many features is noise on other steps, and the same noise for every reward."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +42,10 @@ class Features:
         return np.concatenate([np.ones((len(z), 1)), z, z**2, waves], axis=1)
 
 
-def fitted(obs: Float[np.ndarray, "B O"], rng: np.random.Generator, waves: int = WAVES) -> Features:
-    """Features with the moments of `obs`; `rng` draws the waves."""
+def fitted(obs: Float[np.ndarray, "B O"], rng: np.random.Generator, waves: int | None = None) -> Features:
+    """Features with the moments of `obs`; `rng` draws the waves, fewer where there are few steps."""
+    if waves is None:
+        waves = min(WAVES, len(obs) // STEPS_A_WAVE)
     seen = np.asarray(obs, dtype=np.float64)
     std = np.std(seen, axis=0)
     size = seen.shape[1]

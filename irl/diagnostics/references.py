@@ -22,12 +22,12 @@ from scipy.stats import rankdata
 
 from irl.core import statistics
 from irl.core.rng import stream
-from irl.core.types import RewardFn
 from irl.diagnostics import bootstrap, epic, npec, val
 from irl.diagnostics.compare import SHAPINGS, Columns, compare, tests_of
 from irl.diagnostics.distance import NAN, Distance, pearson_distance
 from irl.diagnostics.features import fitted
 from irl.diagnostics.segments import WHOLE, Segments, segments
+from irl.diagnostics.stack import Given
 
 NAMES = ("pearson", "spearman", "kendall", "erc", "starc-val", "npec", "epic")
 KENDALL_STEPS, KENDALL_DRAWS = 2000, 100
@@ -63,7 +63,7 @@ def of_steps(name: str, of: Columns, seed: int) -> list[Distance]:
 
 
 def of_functions(
-    truth: RewardFn, rewards: Sequence[RewardFn], of: Columns, seed: int, size: int = EPIC_STEPS
+    truth: Given, rewards: Sequence[Given], of: Columns, seed: int, size: int = EPIC_STEPS
 ) -> list[Distance]:
     """EPIC of rewards of (s, a, s'), over `size` steps drawn from the stack.
 
@@ -76,7 +76,7 @@ def of_functions(
     rows = rows.sort().values
     samples = replace(batch[states], action=batch.action[actions])
 
-    def left(reward: RewardFn, n: int) -> Float[np.ndarray, "B"]:
+    def left(reward: Given, n: int) -> Float[np.ndarray, "B"]:
         return epic.canonical(reward, batch[rows[:: len(rows) // n]], samples[:n], of.gamma)
 
     few = min(EPIC_TEST_STEPS, len(rows))
@@ -109,8 +109,8 @@ def _kendall(every: Segments, of: Columns, seed: int) -> list[Distance]:
             replace(
                 d,
                 value=column(i) if known else NAN,
-                low=low if known else NAN,
-                high=high if known else NAN,
+                low=low if np.isfinite(d.low) else NAN,
+                high=high if np.isfinite(d.low) else NAN,
                 self_error=max(tests[:SHAPINGS]),
                 negation=tests[SHAPINGS],
                 random=tests[SHAPINGS + 1],

@@ -4,16 +4,19 @@ A stratum is one kind of play: held-out expert, random actions, a policy at the 
 are taken over the stack, resampled by episode within each stratum, and can be read within one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
+from torch import Tensor
 
-from irl.core.types import Episode, RewardFn, Transitions, from_episodes
+from irl.core.types import Episode, Transitions, from_episodes
 from irl.rewards.artefact import LearnedReward
 
+Given = Callable[[Transitions], Tensor | np.ndarray]
+"""A reward from anywhere: a `RewardFn`, or any function of a batch that gives a number a step."""
 Strata = Mapping[str, Sequence[Episode]]
 """Episodes by the name of their kind of play."""
 
@@ -81,7 +84,7 @@ def stack(strata: Strata) -> Stack:
     return Stack(from_episodes(every), layout)
 
 
-def read(reward: RewardFn, batch: Transitions, rows: int = 20_000) -> Float[np.ndarray, "B"]:
+def read(reward: Given, batch: Transitions, rows: int = 20_000) -> Float[np.ndarray, "B"]:
     """The reward of each step, in float64, asked for `rows` steps at a time.
 
     Of a learned reward that pays a termination for all the time in the absorbing state after it, the same

@@ -12,10 +12,11 @@ import torch
 from jaxtyping import Float
 
 from irl.core.nets import MIN_STD
-from irl.core.types import RewardFn, Transitions
+from irl.core.types import Transitions
+from irl.diagnostics.stack import Given
 
 
-def steepness(reward: RewardFn, batch: Transitions) -> Float[np.ndarray, "B"]:
+def steepness(reward: Given, batch: Transitions) -> Float[np.ndarray, "B"]:
     """The norm of the gradient at each step; NaN where the function has none, as a recorded reward.
 
     Cost: one pass forwards and backwards.

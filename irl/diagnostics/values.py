@@ -24,7 +24,7 @@ from scipy.linalg import lu_factor, lu_solve
 
 from irl.diagnostics.stack import Stack
 
-RIDGE = 1e-9
+RIDGE = 1e-8
 """Lambda, for features of size 1."""
 SOLVES = 3
 ROWS = 8192

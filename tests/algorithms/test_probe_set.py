@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 
 from irl.algorithms.probe_file import load_probe, save_probe
 from irl.algorithms.probe_make import at_shares, base_probe, own_strata
@@ -63,6 +64,7 @@ def test_a_task_of_short_episodes_has_a_smaller_probe() -> None:
 
 def test_a_choice_of_actions_is_made_worse_too() -> None:
     env = make("CartPole-v1")
+    assert isinstance(env.action_space, Box)
     first = np.array([1.0, 0.0])
     worse = noised(lambda obs: first, env.action_space, 0.5, stream(0, "noise"))
     chosen = np.array([worse(np.zeros(4)) for _ in range(400)])
@@ -110,7 +112,8 @@ def test_what_is_no_probe_is_refused(tmp_path: Path, file: Path) -> None:
         (tmp_path / "bad.npz").write_bytes(content)
         with pytest.raises(UserError, match="not a probe this version reads"):
             load_probe(tmp_path / "bad.npz")
-    np.savez(tmp_path / "new.npz", **{"about.json": np.frombuffer(b'{"format":"x","version":9}', np.uint8)})
+    about: dict = {"about.json": np.frombuffer(b'{"format":"x","version":9}', np.uint8)}
+    np.savez(tmp_path / "new.npz", **about)
     with pytest.raises(UserError, match=r"expected irl\.probe 1"):
         load_probe(tmp_path / "new.npz")
 

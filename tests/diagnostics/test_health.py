@@ -28,7 +28,7 @@ def divergence() -> float:
 
     def part(x: float) -> float:
         p, q = norm.pdf(x, M), norm.pdf(x, -M)
-        return 0.5 * p * math.log(2 * p / (p + q)) + 0.5 * q * math.log(2 * q / (p + q))
+        return float(0.5 * p * math.log(2 * p / (p + q)) + 0.5 * q * math.log(2 * q / (p + q)))
 
     return quad(part, -9, 9)[0]
 

@@ -117,13 +117,16 @@ def test_the_parts_of_airl_are_apart(irl: Command) -> None:
 
 
 @pytest.mark.parametrize("run", [AIRLRun, AIRLSACRun])
-def test_the_density_of_an_exported_policy_is_the_learners(run, home: Path) -> None:
-    small = {"learner": PPOConfig(n_envs=2, steps_per_round=64)} if run is AIRLRun else {}
-    config = run(env_id=TASK, demos="irl/pointmass/expert-v0", steps=64, **small)
+def test_the_density_of_an_exported_policy_is_the_learners(run) -> None:
+    config = run(env_id=TASK, steps=64)
+    if isinstance(config, AIRLRun):
+        config = replace(config, learner=PPOConfig(n_envs=2, steps_per_round=64, batch_size=32))
     algorithm = build.imitation(config, pointmass.demonstrations(3))
     policy = algorithm.learner.policy()
     batch = from_episodes(rollouts(TASK, policy, [0, 1]) + pointmass.demonstrations(1))
-    torch.testing.assert_close(log_pi(policy, batch), algorithm.learner.log_pi(batch), rtol=1e-4, atol=1e-4)
+    # SAC's hidden layers exchange bfloat16
+    near = {"rtol": 1e-4, "atol": 1e-4} if run is AIRLRun else {"rtol": 0.02, "atol": 0.1}
+    torch.testing.assert_close(log_pi(policy, batch), algorithm.learner.log_pi(batch), **near)
 
 
 def test_through_a_frozen_normaliser_only_the_networks_differ(train: Callable[..., Path]) -> None:
