@@ -50,8 +50,7 @@ def kendall(a: Float[np.ndarray, "N"], b: Float[np.ndarray, "N"]) -> float:
     """
     if not _comparable(a, b):
         return float("nan")
-    tau, _ = kendalltau(a, b)
-    return float(tau)
+    return float(np.asarray(kendalltau(a, b), dtype=np.float64)[0])
 
 
 def auroc(positive: Float[np.ndarray, "P"], negative: Float[np.ndarray, "N"]) -> float:

@@ -6,6 +6,8 @@
 The distances among its own steps leave each step itself out.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
@@ -14,26 +16,41 @@ from irl.core.nets import MIN_STD
 from irl.core.types import Transitions
 
 NEIGHBOURS = 5
-MOST = 2000
-"""Steps of a side, evenly spaced: nearest neighbours cost the product."""
+MOST = 1000
+"""Steps of a side, evenly spaced: in so many dimensions nearest neighbours cost the product."""
 INSIDE = 0.99
 
 
-def outside(probe: Transitions, new: Transitions) -> float:
-    """The share of new steps (s, a) that lie outside the probe; about 0.01 of steps like its own.
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """Where a probe has steps (s, a)."""
 
-    NaN where the probe has too few to have neighbours.
-    """
-    there, steps = _thinned(_seen(probe)), _thinned(_seen(new))
+    mean: Float[np.ndarray, "I"]
+    std: Float[np.ndarray, "I"]
+    tree: KDTree
+    radius: float
+    """Of 99 % of its own steps, the k-th neighbour is nearer; NaN where there are too few to have any."""
+
+    def outside(self, new: Transitions) -> float:
+        """The share of new steps that lie outside; about 0.01 of steps like the probe's own."""
+        if not np.isfinite(self.radius):
+            return float("nan")
+        steps = (_thinned(_seen(new)) - self.mean) / self.std
+        distances, _ = self.tree.query(steps, k=NEIGHBOURS)
+        return float(np.mean(distances[:, -1] > self.radius))
+
+
+def coverage(probe: Transitions) -> Coverage:
+    """Where the steps of `probe` lie."""
+    there = _thinned(_seen(probe))
     mean, std = np.mean(there, axis=0), np.std(there, axis=0)
     std = np.where(std < MIN_STD, 1.0, std)
-    there, steps = (there - mean) / std, (steps - mean) / std
-    if len(there) <= NEIGHBOURS:
-        return float("nan")
-    tree = KDTree(there)
-    own, _ = tree.query(there, k=NEIGHBOURS + 1)
-    new_ones, _ = tree.query(steps, k=NEIGHBOURS)
-    return float(np.mean(new_ones[:, -1] > np.quantile(own[:, -1], INSIDE)))
+    there = (there - mean) / std
+    tree, radius = KDTree(there), float("nan")
+    if len(there) > NEIGHBOURS:
+        own, _ = tree.query(there, k=NEIGHBOURS + 1)
+        radius = float(np.quantile(own[:, -1], INSIDE))
+    return Coverage(mean, std, tree, radius)
 
 
 def _seen(batch: Transitions) -> Float[np.ndarray, "B I"]:

@@ -40,8 +40,7 @@ def shift(before: Float[np.ndarray, "N"], after: Float[np.ndarray, "M"]) -> Shif
     nan = float("nan")
     if not len(before) or not len(after) or not (np.isfinite(before).all() and np.isfinite(after).all()):
         return Shift(nan, nan, nan, nan)
-    statistic, _ = ks_2samp(before, after, method="asymp")
-    ks = float(statistic)
+    ks = float(np.asarray(ks_2samp(before, after, method="asymp"), dtype=np.float64)[0])
     if statistics.is_constant(before):
         return Shift(nan, ks, nan, nan)
     w1 = float(wasserstein_distance(before, after) / np.std(before))

@@ -17,7 +17,7 @@ from irl.algorithms.probe_set import ProbeSet
 from irl.core import statistics
 from irl.core.types import Episode, Transitions, from_episodes
 from irl.diagnostics import compare, val
-from irl.diagnostics.coverage import outside
+from irl.diagnostics.coverage import coverage
 from irl.diagnostics.distribution import shift
 from irl.diagnostics.drift import split
 from irl.diagnostics.health import health
@@ -77,7 +77,7 @@ def judge_snapshots(
         healths.append(_health(snapshot, played, played.fresh[at]))
         tick(f"discriminator at {at}")
     parts, asked = _parts(snapshots, steps)
-    terminated = steps.batch.terminated.numpy()
+    terminated, covered = steps.batch.terminated.numpy(), coverage(steps.batch)
     return {
         **found,
         "health": healths,
@@ -86,7 +86,7 @@ def judge_snapshots(
         "moves": [_split_of(a, b) for a, b in itertools.pairwise(columns.T)],
         "parts": parts,
         "normaliser": _normaliser(snapshots, steps),
-        "outside": [finite(outside(steps.batch, from_episodes(list(played.fresh[at])))) for at in snapshots],
+        "outside": [finite(covered.outside(from_episodes(list(played.fresh[at])))) for at in snapshots],
         "cost": {"rewards": len(steps.batch) * (len(snapshots) + asked)},
     }
 

@@ -1,8 +1,9 @@
+import numpy as np
 import torch
 
 from irl.core.rng import torch_stream
 from irl.core.types import Transitions
-from irl.diagnostics.coverage import outside
+from irl.diagnostics.coverage import coverage
 
 
 def batch(n: int, name: str, offset: float = 0.0) -> Transitions:
@@ -12,6 +13,10 @@ def batch(n: int, name: str, offset: float = 0.0) -> Transitions:
 
 
 def test_steps_like_the_probes_are_inside_and_others_are_not() -> None:
-    probe = batch(900, "probe")
-    assert outside(probe, batch(900, "like it")) < 0.05
-    assert outside(probe, batch(900, "elsewhere", offset=80.0)) > 0.95
+    probe = coverage(batch(900, "probe"))
+    assert probe.outside(batch(900, "like it")) < 0.05
+    assert probe.outside(batch(900, "elsewhere", offset=80.0)) > 0.95
+
+
+def test_a_probe_of_few_steps_covers_what_nobody_knows() -> None:
+    assert np.isnan(coverage(batch(5, "few")).outside(batch(9, "new")))
