@@ -18,7 +18,7 @@ def test_the_library_lines_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
     main(["demos", "generate", "--env-id", "Hopper-v5", "--episodes", "5", "--seed", "0"])
     words = "--demos irl/hopper/expert-v0 --demo-episodes 4 --steps 2048 --watch.eval-episodes 0"
     main(f"train gail --env-id Hopper-v5 --out runs/hopper {words} --schedule.epochs 1".split())
-    block, ready_made = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
+    block, ready_made, judged = re.findall(r"```python\n(.*?)```", README.read_text(), flags=re.DOTALL)
     last = list(open_run(Path("runs/hopper")).snapshots().values())[-1].name
     capsys.readouterr()
     names: dict[str, object] = {"PPO": PPO}
@@ -27,6 +27,10 @@ def test_the_library_lines_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, 
     assert len(printed) == 3
     exec(ready_made.replace("200_000", "2048"), names)
     assert names["reward"].spec.env_steps == 2048  # pyright: ignore[reportAttributeAccessIssue]
+    main(["probe", "--env-id", "Hopper-v5", "--steps", "500", "--out", "hopper.npz"])
+    capsys.readouterr()
+    exec(judged, {})
+    assert "VAL, n = 50" in capsys.readouterr().out
 
 
 def test_every_command_it_names_exists() -> None:

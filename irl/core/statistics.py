@@ -6,7 +6,7 @@ warns, and every one takes its averages in float64.
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import rankdata
+from scipy.stats import kendalltau, rankdata
 
 ROUNDING = 1e-13
 """A spread below this share of the largest magnitude is what summing terms in float64 leaves."""
@@ -40,6 +40,17 @@ def spearman(a: Float[np.ndarray, "N"], b: Float[np.ndarray, "N"]) -> float:
     if not _comparable(a, b):
         return float("nan")
     return pearson(rankdata(a), rankdata(b))
+
+
+def kendall(a: Float[np.ndarray, "N"], b: Float[np.ndarray, "N"]) -> float:
+    """Kendall's tau-b, in [-1, 1]: pairs in the same order less pairs in the other, ties allowed for.
+
+    Of all pairs of steps, a share (1 - tau) / 2 is in the other order, where there are no ties.
+    NaN where either is constant or holds a number that is not finite. Cost: N log N.
+    """
+    if not _comparable(a, b):
+        return float("nan")
+    return float(np.asarray(kendalltau(a, b), dtype=np.float64)[0])
 
 
 def auroc(positive: Float[np.ndarray, "P"], negative: Float[np.ndarray, "N"]) -> float:

@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 
 from irl.core.errors import UserError
-from irl.experiment import demonstrations, evaluate, experts, export, imports, retrain, train
+from irl.experiment import demonstrations, evaluate, experts, export, imports, probes, retrain, train
 from irl.experiment.configs import AIRLRun, AIRLSACRun, DACRun, GAILRun, GAILSACRun
 from irl.experiment.modules import import_named
 from irl.experiment.play import Interrupted
@@ -31,6 +31,7 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("train", "airl"): (AIRLRun, train.train),
     ("train", "airl-sac"): (AIRLSACRun, train.train),
     ("train",): (train.Resume, train.go_on),
+    ("probe",): (probes.Probe, probes.make_probe),
     ("evaluate",): (evaluate.Evaluate, evaluate.evaluate),
     ("retrain",): (retrain.Retrain, retrain.retrain),
     ("export",): (export.Export, export.export),

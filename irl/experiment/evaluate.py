@@ -1,5 +1,6 @@
 """`irl evaluate`: the policy and the reward of a run in numbers, and one page to look at."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,19 +12,20 @@ import tyro
 from rich.console import Console
 
 from irl.algorithms.probe import probe
+from irl.algorithms.probe_make import STEPS
 from irl.core import files, records
 from irl.core.config import check_at_least, check_seed, from_json
 from irl.core.errors import UserError
 from irl.core.rng import episode_seeds
 from irl.core.types import Episode
-from irl.demos.load import Demos
 from irl.envs.make import make
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Imitation
 from irl.experiment.draw import drawn_again
 from irl.experiment.judge import finite, judge_drift, judge_reward
+from irl.experiment.probed import Asked, Named, probed
 from irl.experiment.progress import each_episode, progress
-from irl.policies import shelf
+from irl.experiment.references import references_of
 from irl.policies.card import normalised_score, summary
 from irl.policies.policy import Policy, check_policy, load_policy
 from irl.report.html import write_report
@@ -48,9 +50,15 @@ class Evaluate:
     """Folder of Minari datasets; that of the run unless given."""
     policies_root: Path | None = None
     """Where the shelf is; expert_data/policies unless given."""
+    probe: Path | None = None
+    """A probe made by `irl probe`; one is played unless given."""
+    probe_steps: int = STEPS
+    """Steps of each stratum of the probe that is played; numbers of other sizes do not compare."""
+    also: tuple[Named, ...] = ()
+    """Distances to give beside VAL."""
 
     def __post_init__(self) -> None:
-        check_at_least(self, 1, "episodes")
+        check_at_least(self, 1, "episodes", "probe_steps")
         check_seed(self.seed)
 
 
@@ -58,11 +66,15 @@ def evaluate(command: Evaluate) -> None:
     """Evaluate, write, print."""
     folder = records.open_run(command.run)
     files.check_writable(target := folder.path / "evaluation.json")
+    began = time.monotonic()
     result = evaluation(folder, command)
     files.write_json(target, result)
     report = write_report(folder.path)
     console = Console()
     console.print(evaluation_table(result))
+    if cost := result["drift"].get("cost"):
+        asked = f"{cost['rewards']:,} rewards were asked for"
+        console.print(f"judged in {time.monotonic() - began:.0f} s; {asked}", highlight=False)
     console.print(f"report: {report}", highlight=False, markup=False, soft_wrap=True)
 
 
@@ -77,14 +89,18 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     torch.set_num_threads(config.threads)
     root = command.datasets_root or config.datasets_root
     demos = drawn_again(config, folder, root)
-    references = _references(config.env_id, demos, command.policies_root)
+    references = references_of(config.env_id, demos, command.policies_root)
     # everything is read before anything is played
-    policy, rewards = _read(config.env_id, snapshots)
+    policies, rewards = _read(config.env_id, snapshots)
+    policy = policies[max(policies)]
     episodes = _play(config.env_id, policy, command)
     expert = demos.held_out or demos.episodes
     judged = probe(expert, episodes, config.env_id, command.seed)
     steps = list(snapshots)[-1]
     reward = judge_reward(rewards[steps], judged, command.seed)
+    drift = judge_drift(rewards, judged)
+    asked = Asked(command.probe, command.probe_steps, command.also, command.seed, command.policies_root)
+    distances, more = probed(config, demos, policies, rewards, asked)
     if not demos.held_out:
         reward["notes"].append("No demonstration is held out: the expert's steps are those trained on.")
     return {
@@ -97,26 +113,27 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "policy": _policy(episodes, references),
         "references": references,
         "reward": reward,
-        "drift": judge_drift(rewards, judged),
+        "distances": distances,
+        "drift": {**drift, **more},
     }
 
 
-def _read(env_id: str, snapshots: Mapping[int, Path]) -> tuple[Policy, dict[int, LearnedReward]]:
-    """The policy of the last snapshot and the reward of each.
+def _read(env_id: str, snapshots: Mapping[int, Path]) -> tuple[dict[int, Policy], dict[int, LearnedReward]]:
+    """The policy and the reward of each snapshot.
 
     Raises:
         UserError: a file is missing or damaged, or of another task.
     """
-    policy = load_policy(list(snapshots.values())[-1] / "policy.safetensors")
+    policies = {steps: load_policy(path / "policy.safetensors") for steps, path in snapshots.items()}
     rewards = {steps: load_reward(path) for steps, path in snapshots.items()}
     env = make(env_id)
     try:
-        check_policy(policy, env)
         for steps, reward in rewards.items():
-            _check_reward(reward, env_id, policy, snapshots[steps])
+            check_policy(policies[steps], env)
+            _check_reward(reward, env_id, policies[steps], snapshots[steps])
     finally:
         env.close()
-    return policy, rewards
+    return policies, rewards
 
 
 def _check_reward(reward: LearnedReward, env_id: str, policy: Policy, path: Path) -> None:
@@ -161,28 +178,3 @@ def _policy(episodes: Sequence[Episode], references: dict[str, Any]) -> dict[str
         "lengths": list(measured.lengths),
         "seeds": list(measured.episode_seeds),
     }
-
-
-def _references(env_id: str, demos: Demos, policies_root: Path | None) -> dict[str, Any]:
-    """Returns to compare with: from the expert's card, else from the dataset, else unknown."""
-    card = shelf.expert_card(env_id, policies_root)
-    expert = random = None
-    if card is not None:
-        source = f"card of {card.env_id} {card.level}"
-        std = card.measured.return_std
-        expert = {"return_mean": card.measured.return_mean, "return_std": std, "source": source}
-        random = {
-            "return_mean": card.random_return_mean,
-            "return_std": card.random_return_std,
-            "source": source,
-        }
-    else:
-        source = f"dataset {demos.dataset_id}"
-        if demos.expert_return is not None:
-            expert = {"return_mean": demos.expert_return, "return_std": None, "source": source}
-        if demos.random_return is not None:
-            random = {"return_mean": demos.random_return, "return_std": None, "source": source}
-    measured = summary(list(demos.episodes))
-    shown = {"return_mean": finite(measured.return_mean), "return_std": finite(measured.return_std)}
-    shown |= {"episodes": measured.episodes, "source": f"dataset {demos.dataset_id}"}
-    return {"expert": expert, "random": random, "demonstrations": shown}

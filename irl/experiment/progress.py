@@ -38,6 +38,19 @@ def each_episode(report: Report) -> Callable[[Episode], None]:
     return lambda episode: report(next(done), f"return {episode.return_:.0f}")
 
 
+def each_step(report: Report, total: int) -> Callable[[Episode], None]:
+    """What a rollout calls with each finished episode, so that `report` shows its steps of about `total`."""
+    played = 0
+
+    def add(episode: Episode) -> None:
+        nonlocal played
+        played += len(episode)
+        # whole episodes run over a total of steps, and a line is printed at the end
+        report(min(played, total - 1), f"return {episode.return_:.0f}")
+
+    return add
+
+
 def training_words(row: Row, steps_per_s: float) -> str:
     """Steps per second, returns and discriminator accuracy of a row of metrics."""
     words = [f"{steps_per_s:.0f} steps/s"]

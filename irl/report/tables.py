@@ -11,18 +11,22 @@ from rich.text import Text
 
 from irl.report.folder import lookup, number, texts
 from irl.report.palette import STRATA, STRATUM_NAMES
+from irl.report.probed import DISTANCES, DRIFT, distance_table, drift_table
 from irl.report.readings import MISSING, amount, key_numbers, spread
 
 
 def evaluation_table(evaluation: Mapping[str, Any]) -> Group:
-    """What to print of an evaluation.json that was read: two tables and the notes.
+    """What to print of an evaluation.json that was read: tables and the notes.
 
     Strings of the file are shown as they are: markup in them is not followed.
     """
     parts: list[Table | Padding] = [_numbers(evaluation)]
     if isinstance(lookup(evaluation, "reward.strata"), Mapping):
         parts.append(_strata(evaluation))
-    for part in ("policy.notes", "reward.notes", "drift.notes", "notes"):
+    for table, legend in ((distance_table(evaluation), DISTANCES), (drift_table(evaluation), DRIFT)):
+        if table is not None:
+            parts += [table, Padding(Text(legend, style="dim"), (0, 1))]
+    for part in ("policy.notes", "reward.notes", "distances.notes", "drift.notes", "notes"):
         parts += [
             Padding(Text(f"Note: {note}", style="dim"), (0, 1)) for note in texts(lookup(evaluation, part))
         ]

@@ -11,6 +11,7 @@ from torch import Tensor
 from irl.core.types import Transitions
 from irl.policies.density import Density
 from irl.rewards import tail
+from irl.rewards.maps import MAPS
 from irl.rewards.nets import LogitNet, LogitSpec
 from irl.rewards.shaped import ShapedNet, ShapedSpec
 
@@ -71,6 +72,25 @@ class LearnedReward:
             return self.net.paid("f", batch, self.spec.gamma) - self._bounded_log_pi(self.log_pi, batch)
         return tail.reward(self.net, self.spec.reward_map, batch, self.spec.gamma)
 
+    def anchored(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """The same reward with the absorbing state at 0: what each step pays above what s_abs pays a step.
+
+            r(s, a) - r(s_abs),   and nothing after a termination
+
+        Over any episode, followed by s_abs for ever, it adds up to r's discounted sum less r(s_abs) / (1 -
+        gamma), which no policy changes. A reward that knows no s_abs is as it was.
+        """
+        self._check(batch)
+        net, pays, gamma = self.net, self.spec.reward_map, self.spec.gamma
+        if not isinstance(net, ShapedNet):
+            of_steps = MAPS[pays](net(batch))
+            return of_steps - MAPS[pays](net.of_absorbing()) if _absorbs(net) else of_steps
+        of_steps = net.g(batch) if pays == "g" else net.f(batch, gamma)
+        if _absorbs(net):
+            # nobody acts in s_abs, so f - log pi is f there
+            of_steps = of_steps - net.a_step_in_absorbing("g" if pays == "g" else "f", gamma)
+        return of_steps if self.log_pi is None else of_steps - self._bounded_log_pi(self.log_pi, batch)
+
     def _bounded_log_pi(self, log_pi: Density, batch: Transitions) -> Float[Tensor, "B"]:
         assert isinstance(self.spec.net, ShapedSpec)
         bound = self.spec.net.log_pi_bound
@@ -85,3 +105,7 @@ class LearnedReward:
                 f"the reward of {self.spec.env_id} takes observations of {expected.obs_dim} and actions of "
                 f"{expected.action_dim}, the batch has {given[0]} and {given[1]}"
             )
+
+
+def _absorbs(net: LogitNet | ShapedNet) -> bool:
+    return net.spec.absorbing_scale > 0

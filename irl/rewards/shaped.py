@@ -167,11 +167,19 @@ class ShapedNet(nn.Module):
         of_steps = self.g(batch) if part == "g" else self.f(batch, gamma)
         if not self.spec.absorbing_scale or not bool(batch.terminated.any()):
             return of_steps
+        return tail.added(of_steps, self.a_step_in_absorbing(part, gamma), batch, gamma)
+
+    def a_step_in_absorbing(self, part: str, gamma: float) -> Float[Tensor, "1"]:
+        """What `part` of the step s_abs -> s_abs is.
+
+        Raises:
+            ValueError: the networks know no s_abs.
+        """
         g = self.of_absorbing()
         if part == "g":
-            return tail.added(of_steps, g, batch, gamma)
+            return g
         h = self.potential(self._flag(self.spec.state)).squeeze(1)
-        return tail.added(of_steps, shaped(g, h, h, torch.ones_like(h), gamma), batch, gamma)
+        return shaped(g, h, h, torch.ones_like(h), gamma)
 
 
 def shaped(

@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from irl.core.rng import stream
-from irl.core.statistics import auroc, is_constant, pearson, spearman
+from irl.core.statistics import auroc, is_constant, kendall, pearson, spearman
 
 small = st.integers(-3, 3).map(float)
 
@@ -16,12 +18,19 @@ def test_pearson_of_a_line_is_one_and_of_its_mirror_minus_one() -> None:
     assert pearson(x, -2 * x + 7) == pytest.approx(-1.0, abs=1e-15)
 
 
+def test_kendall_counts_pairs() -> None:
+    a, b = stream(0, "test").normal(size=(2, 40))
+    signs = [np.sign((a[i] - a[j]) * (b[i] - b[j])) for i, j in itertools.combinations(range(40), 2)]
+    assert kendall(a, b) == pytest.approx(np.mean(signs))
+    assert kendall(a, -a) == pytest.approx(-1)
+
+
 def test_pearson_agrees_with_numpy() -> None:
     a, b = stream(0, "test").normal(size=(2, 300))
     assert pearson(a, a + b) == pytest.approx(float(np.corrcoef(a, a + b)[0, 1]), abs=1e-14)
 
 
-@pytest.mark.parametrize("measure", [pearson, spearman])
+@pytest.mark.parametrize("measure", [pearson, spearman, kendall])
 @pytest.mark.parametrize(
     "column",
     [

@@ -157,3 +157,28 @@ def test_weights_of_another_network_are_refused(folder: Path) -> None:
     set_weights(folder, weights | {name: torch.full_like(weights[name], float("nan"))})
     with pytest.raises(UserError, match=r"potential\.0\.bias has values that are not finite"):
         load_reward(folder)
+
+
+@pytest.mark.parametrize("part", ["g", "f", "f-log-pi"])
+@pytest.mark.parametrize("ends", [True, False])
+def test_anchored_it_pays_an_episode_less_what_the_absorbing_state_pays_for_ever(
+    folder: Path, part: str, ends: bool
+) -> None:
+    save_policy(a_policy(), folder.parent / "policy.safetensors")
+    reward = load_reward(folder, part)
+    last = torch.arange(20) == 19
+    episode = replace(steps(), terminated=last & ends)
+    discount = 0.9 ** torch.arange(20)
+    given, anchored = reward(episode), reward.anchored(episode)
+    rest = replace(episode, absorbing=~last | True, next_absorbing=~last | True, terminated=last & False)[:1]
+    of_rest = float(reward(replace(rest, obs=rest.obs * 0, action=rest.action * 0, next_obs=rest.obs * 0))[0])
+    # what follows the 20 steps: s_abs for ever where they ended, the same unknown for both where they did not
+    less = of_rest / 0.1 if ends else of_rest * float(discount.sum())
+    assert float((discount * given).sum() - (discount * anchored).sum()) == pytest.approx(less, rel=1e-4)
+
+
+def test_anchored_a_reward_without_an_absorbing_state_is_as_it_was(tmp_path: Path) -> None:
+    spec = replace(SHAPED, inputs="obs", net=ShapedSpec(3, 2, (), (4,), inputs="obs"))
+    save_reward(tmp_path, spec, shaped_net(spec))
+    reward = load_reward(tmp_path)
+    assert torch.equal(reward.anchored(steps()), reward(steps()))

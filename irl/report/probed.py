@@ -1,0 +1,153 @@
+"""The distances and the drift of an evaluation as `irl evaluate` prints them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from irl.report.folder import finite, lookup, number
+
+GREY = "dim"
+UNKNOWN = "-"
+
+
+def distance_table(evaluation: Mapping[str, Any]) -> Table | None:
+    """Distances over the base probe and within each stratum; None where there are none."""
+    curve = lookup(evaluation, "distances.curve")
+    if not isinstance(curve, list):
+        return None
+    table = Table(box=box.SIMPLE_HEAD, title=_bold(_title(evaluation)), title_justify="left")
+    table.add_column("distance to the hand-written reward")
+    for name in ("value", "95 %", "own error", "random"):
+        table.add_column(name, justify="right")
+    named = lookup(evaluation, "distances.references")
+    for row in [*curve, *(named if isinstance(named, list) else [])]:
+        _add(table, _name(row), row)
+    strata = lookup(evaluation, "distances.strata")
+    for name, row in strata.items() if isinstance(strata, Mapping) else []:
+        few = lookup(row, "covered") is not True
+        episodes = number(row, "episodes") or 0.0
+        _add(table, f"  within {name}" + (f", {episodes:.0f} episodes: few" if few else ""), row, grey=few)
+    return table
+
+
+def drift_table(evaluation: Mapping[str, Any]) -> Table | None:
+    """What moved, a row a snapshot; None where that was not measured."""
+    steps, health = lookup(evaluation, "drift.snapshots"), lookup(evaluation, "drift.health")
+    if not isinstance(steps, list) or not isinstance(health, list):
+        return None
+    table = Table(box=box.SIMPLE_HEAD, title=_bold(_drift_title(evaluation)), title_justify="left")
+    for name in _COLUMNS:
+        table.add_column(name, justify="right")
+    for i, at in enumerate(steps):
+        table.add_row(*_snapshot(evaluation, i, at))
+    return table
+
+
+_COLUMNS = (
+    "step",
+    "to truth",
+    "moved",
+    "shape",
+    "turned",
+    "AUROC",
+    "by heart",
+    "JSD ≥",
+    "ECE",
+    "slope",
+    "b",
+    "outside",
+)
+
+DISTANCES = (
+    "0 asks for the same, 1 for the opposite. own error: what the computation finds between the "
+    "hand-written reward and itself with random shaping; a distance below it is not distinguishable. "
+    "random: what it finds for a random network. The interval is over episodes."
+)
+DRIFT = (
+    "to truth, moved: VAL distance to the hand-written reward and from the snapshot before; shape: share of "
+    "the mean squared change that is no offset or scale; turned: share of pairs of steps in the other order; "
+    "AUROC: held-out expert against fresh policy steps, 0.5 is blind; by heart: what training demonstrations "
+    "have over held-out ones; JSD: nats, at least; ECE: how far D is from a probability; slope: 99th "
+    "percentile of the logit's gradient; b: survival bias, ±1 pays the same for every step; "
+    "outside: share of fresh policy steps that lie where the probe has none, of which nothing here speaks."
+)
+
+
+def _snapshot(evaluation: Mapping[str, Any], i: int, at: object) -> list[Text]:
+    drift = lookup(evaluation, "drift")
+    health = _item(drift, "health", i)
+    side = "held_out" if lookup(health, "held_out") is not None else "train"
+    truth = _item(drift, "to_truth", i)
+    before = i - 1
+    values = [
+        (_value(truth), 3),
+        (_item(drift, "speed", before), 3),
+        (lookup(_item(drift, "moves", before), "shares.shape"), 2),
+        (lookup(_item(drift, "shift", before), "pair_flips"), 2),
+        (lookup(health, f"{side}.auroc"), 2),
+        (lookup(health, "memorised"), 2),
+        (lookup(health, f"{side}.jsd_bound"), 2),
+        (lookup(health, f"{side}.ece"), 2),
+        (lookup(health, "slope_p99"), 1),
+        (lookup(_item(drift, "hygiene", i), "survival_bias"), 2),
+        (_item(drift, "outside", i), 2),
+    ]
+    first = Text(f"{at:,}" if isinstance(at, int) else UNKNOWN)
+    return [first, *(_text(value, digits) for value, digits in values)]
+
+
+def _add(table: Table, name: str, row: object, grey: bool = False) -> None:
+    style = GREY if grey else ""
+    reason = lookup(row, "reason")
+    if isinstance(reason, str):
+        table.add_row(Text(name, style=style), Text("undefined", style=GREY), Text(reason, style=GREY))
+        return
+    told = lookup(row, "distinguishable") is not False
+    value = _text(number(row, "value"), 3) if told else Text("not distinguishable", style=GREY)
+    ends = number(row, "low"), number(row, "high")
+    interval = UNKNOWN if ends[0] is None or ends[1] is None else f"{ends[0]:.3f}-{ends[1]:.3f}"
+    rest = [_text(number(row, key), 3) for key in ("self_error", "random")]
+    table.add_row(Text(name, style=style), value, Text(interval), *rest, style=style)
+
+
+def _name(row: object) -> str:
+    n, name = number(row, "n"), str(lookup(row, "name"))
+    if n is None or name != "VAL":
+        return name
+    return f"{name}, whole episodes" if n == 0 else f"{name} over {n:.0f} steps"
+
+
+def _title(evaluation: Mapping[str, Any]) -> str:
+    steps, episodes = (number(evaluation, f"distances.{key}") or 0.0 for key in ("steps", "episodes"))
+    digest = str(lookup(evaluation, "distances.probe_sha256"))[:12]
+    return f"base probe {digest}, {steps:,.0f} steps of {episodes:,.0f} episodes"
+
+
+def _drift_title(evaluation: Mapping[str, Any]) -> str:
+    n, cycling = number(evaluation, "drift.n"), number(evaluation, "drift.cycling")
+    moved = lookup(evaluation, "drift.normaliser.moved")
+    parts = ["drift" if n is None else f"drift, over {n:.0f} steps"]
+    parts += [] if cycling is None else [f"path {cycling:.1f} times the way from first to last"]
+    parts += ["the normaliser moved too"] if moved is True else []
+    return ", ".join(parts)
+
+
+def _bold(title: str) -> Text:
+    return Text(title, style="bold")
+
+
+def _item(drift: object, key: str, i: int) -> Any:
+    values = lookup(drift, key)
+    return values[i] if isinstance(values, list) and 0 <= i < len(values) else None
+
+
+def _value(truth: object) -> float | None:
+    return 0.0 if lookup(truth, "distinguishable") is False else number(truth, "value")
+
+
+def _text(value: object, digits: int) -> Text:
+    known = finite(value)
+    return Text(UNKNOWN, style=GREY) if known is None else Text(f"{known:.{digits}f}")

@@ -1,0 +1,95 @@
+"""The tables of distances and drift, of what a file holds and of what it lacks."""
+
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from irl.report.tables import evaluation_table
+
+
+def row(value: float | None, self_error: float = 0.01, **more: Any) -> dict[str, Any]:
+    known = {"name": "VAL", "n": 50, "value": value, "low": 0.1, "high": 0.4, "self_error": self_error}
+    told = None if value is None else value > self_error
+    return known | {"random": 0.6, "episodes": 30, "distinguishable": told, "reason": None} | more
+
+
+@pytest.fixture
+def probed(evaluation: dict[str, Any]) -> dict[str, Any]:
+    strata = {
+        "expert": row(0.123, covered=False, episodes=2),
+        "random": row(0.005, covered=True),
+    }
+    distances = {
+        "probe_sha256": "abcdef0123456789",
+        "steps": 8000,
+        "episodes": 60,
+        "curve": [
+            row(0.25, n=1),
+            row(0.004),
+            row(None, n=100, reason="segments of 100 steps fit into 0 of 60"),
+        ],
+        "references": [row(0.31, name="epic", n=None)],
+        "strata": strata,
+        "notes": ["medium: no medium policy is shelved"],
+    }
+    n = len(evaluation["drift"]["snapshots"])
+    health = {"auroc": 0.91, "jsd_bound": 0.2, "ece": 0.1}
+    evaluation["distances"] = distances
+    evaluation["drift"] |= {
+        "n": 50,
+        "cycling": 2.5,
+        "normaliser": {"moved": False, "frozen": None},
+        "to_truth": [row(0.3)] * n,
+        "speed": [0.111] * (n - 1),
+        "moves": [{"shares": {"shape": 0.77}}] * (n - 1),
+        "shift": [{"pair_flips": 0.22}] * (n - 1),
+        "health": [{"train": health, "held_out": health, "memorised": 0.03, "slope_p99": 2.0}] * n,
+        "hygiene": [{"survival_bias": 0.95}] * n,
+        "outside": [0.44] * (n - 1) + [None],
+    }
+    return evaluation
+
+
+def printed(evaluation: dict[str, Any], width: int = 120) -> str:
+    console = Console(width=width, color_system=None)
+    with console.capture() as capture:
+        console.print(evaluation_table(evaluation))
+    return capture.get()
+
+
+def test_the_tables_say_what_was_measured(probed: dict[str, Any]) -> None:
+    text = printed(probed)
+    for expected in (
+        "base probe abcdef012345, 8,000 steps of 60 episodes",
+        "VAL over 1 steps",
+        "not distinguishable",
+        "segments of 100",
+        "epic",
+        "within expert, 2 episodes: few",
+        "path 2.5 times the way",
+        "0.77",
+        "no medium policy is shelved",
+    ):
+        assert expected in text, expected
+
+
+def test_the_first_snapshot_moved_from_nowhere(probed: dict[str, Any]) -> None:
+    lines = [line.split() for line in printed(probed).splitlines()]
+    first = next(words for words in lines if len(words) == 12 and words[0] == "0")
+    assert first[1:4] == ["0.300", "-", "-"]
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_they_fit_the_terminal(probed: dict[str, Any], width: int) -> None:
+    assert max(len(line) for line in printed(probed, width).splitlines()) <= width
+
+
+def test_a_file_without_them_has_no_such_tables(evaluation: dict[str, Any]) -> None:
+    assert "own error" not in printed(evaluation)
+    evaluation["distances"] = {"curve": "x"}
+    evaluation["drift"]["health"] = 3
+    assert "own error" not in printed(evaluation)
+    evaluation["distances"] = {"curve": [None, 3], "strata": {"a": None}}
+    evaluation["drift"]["health"] = [None]
+    assert "own error" in printed(evaluation)
