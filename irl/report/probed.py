@@ -1,6 +1,6 @@
 """The distances and the drift of an evaluation as `irl evaluate` prints them."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rich import box
@@ -35,31 +35,32 @@ def distance_table(evaluation: Mapping[str, Any]) -> Table | None:
 
 def drift_table(evaluation: Mapping[str, Any]) -> Table | None:
     """What moved, a row a snapshot; None where that was not measured."""
+    columns = ("step", "to truth", "moved", "shape", "turned", "bonus", "outside")
+    return _by_snapshot(evaluation, _drift_title(evaluation), columns, _moved)
+
+
+def health_table(evaluation: Mapping[str, Any]) -> Table | None:
+    """How well the discriminator tells, a row a snapshot; None where that was not measured."""
+    columns = ("step", "AUROC", "by heart", "JSD ≥", "ECE", "slope")
+    return _by_snapshot(evaluation, "the discriminator", columns, _health)
+
+
+def _by_snapshot(
+    evaluation: Mapping[str, Any],
+    title: str,
+    columns: Sequence[str],
+    row: Callable[[Mapping[str, Any], int], list[Text]],
+) -> Table | None:
     steps, health = lookup(evaluation, "drift.snapshots"), lookup(evaluation, "drift.health")
     if not isinstance(steps, list) or not isinstance(health, list):
         return None
-    table = Table(box=box.SIMPLE_HEAD, title=_bold(_drift_title(evaluation)), title_justify="left")
-    for name in _COLUMNS:
+    table = Table(box=box.SIMPLE_HEAD, title=_bold(title), title_justify="left")
+    for name in columns:
         table.add_column(name, justify="right")
     for i, at in enumerate(steps):
-        table.add_row(*_snapshot(evaluation, i, at))
+        table.add_row(Text(f"{at:,}" if isinstance(at, int) else UNKNOWN), *row(evaluation, i))
     return table
 
-
-_COLUMNS = (
-    "step",
-    "to truth",
-    "moved",
-    "shape",
-    "turned",
-    "AUROC",
-    "by heart",
-    "JSD ≥",
-    "ECE",
-    "slope",
-    "b",
-    "outside",
-)
 
 DISTANCES = (
     "0 asks for the same, 1 for the opposite. own error: what the computation finds between the "
@@ -67,36 +68,41 @@ DISTANCES = (
     "random: what it finds for a random network. The interval is over episodes."
 )
 DRIFT = (
-    "to truth, moved: VAL distance to the hand-written reward and from the snapshot before; shape: share of "
-    "the mean squared change that is no offset or scale; turned: share of pairs of steps in the other order; "
+    "to truth, moved: VAL distance to the hand-written reward (n.d.: not distinguishable) and from the "
+    "snapshot before; shape: share of the mean squared change that is no offset or scale; turned: share of "
+    "pairs of steps in the other order; bonus: survival bias, ±1 pays the same for every step; outside: "
+    "share of fresh policy steps that lie where the probe has none, of which nothing here speaks."
+)
+HEALTH = (
     "AUROC: held-out expert against fresh policy steps, 0.5 is blind; by heart: what training demonstrations "
     "have over held-out ones; JSD: nats, at least; ECE: how far D is from a probability; slope: 99th "
-    "percentile of the logit's gradient; b: survival bias, ±1 pays the same for every step; "
-    "outside: share of fresh policy steps that lie where the probe has none, of which nothing here speaks."
+    "percentile of the logit's gradient."
 )
 
 
-def _snapshot(evaluation: Mapping[str, Any], i: int, at: object) -> list[Text]:
-    drift = lookup(evaluation, "drift")
-    health = _item(drift, "health", i)
-    side = "held_out" if lookup(health, "held_out") is not None else "train"
-    truth = _item(drift, "to_truth", i)
-    before = i - 1
+def _moved(evaluation: Mapping[str, Any], i: int) -> list[Text]:
+    drift, before = lookup(evaluation, "drift"), i - 1
     values = [
-        (_value(truth), 3),
         (_item(drift, "speed", before), 3),
         (lookup(_item(drift, "moves", before), "shares.shape"), 2),
         (lookup(_item(drift, "shift", before), "pair_flips"), 2),
+        (lookup(_item(drift, "hygiene", i), "survival_bias"), 2),
+        (_item(drift, "outside", i), 2),
+    ]
+    return [_to_truth(_item(drift, "to_truth", i)), *(_text(value, digits) for value, digits in values)]
+
+
+def _health(evaluation: Mapping[str, Any], i: int) -> list[Text]:
+    health = _item(lookup(evaluation, "drift"), "health", i)
+    side = "held_out" if lookup(health, "held_out") is not None else "train"
+    values = [
         (lookup(health, f"{side}.auroc"), 2),
         (lookup(health, "memorised"), 2),
         (lookup(health, f"{side}.jsd_bound"), 2),
         (lookup(health, f"{side}.ece"), 2),
         (lookup(health, "slope_p99"), 1),
-        (lookup(_item(drift, "hygiene", i), "survival_bias"), 2),
-        (_item(drift, "outside", i), 2),
     ]
-    first = Text(f"{at:,}" if isinstance(at, int) else UNKNOWN)
-    return [first, *(_text(value, digits) for value, digits in values)]
+    return [_text(value, digits) for value, digits in values]
 
 
 def _add(table: Table, name: str, row: object, grey: bool = False) -> None:
@@ -144,8 +150,10 @@ def _item(drift: object, key: str, i: int) -> Any:
     return values[i] if isinstance(values, list) and 0 <= i < len(values) else None
 
 
-def _value(truth: object) -> float | None:
-    return 0.0 if lookup(truth, "distinguishable") is False else number(truth, "value")
+def _to_truth(truth: object) -> Text:
+    if lookup(truth, "distinguishable") is False:
+        return Text("n.d.", style=GREY)
+    return _text(number(truth, "value"), 3)
 
 
 def _text(value: object, digits: int) -> Text:

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from irl.report.folder import lookup, number, texts
 from irl.report.palette import STRATA, STRATUM_NAMES
-from irl.report.probed import DISTANCES, DRIFT, distance_table, drift_table
+from irl.report.probed import DISTANCES, DRIFT, HEALTH, distance_table, drift_table, health_table
 from irl.report.readings import MISSING, amount, key_numbers, spread
 
 
@@ -23,7 +23,9 @@ def evaluation_table(evaluation: Mapping[str, Any]) -> Group:
     parts: list[Table | Padding] = [_numbers(evaluation)]
     if isinstance(lookup(evaluation, "reward.strata"), Mapping):
         parts.append(_strata(evaluation))
-    for table, legend in ((distance_table(evaluation), DISTANCES), (drift_table(evaluation), DRIFT)):
+    distances = (distance_table(evaluation), DISTANCES)
+    drift = (drift_table(evaluation), DRIFT)
+    for table, legend in (distances, drift, (health_table(evaluation), HEALTH)):
         if table is not None:
             parts += [table, Padding(Text(legend, style="dim"), (0, 1))]
     for part in ("policy.notes", "reward.notes", "distances.notes", "drift.notes", "notes"):

@@ -76,8 +76,19 @@ def test_the_tables_say_what_was_measured(probed: dict[str, Any]) -> None:
 
 def test_the_first_snapshot_moved_from_nowhere(probed: dict[str, Any]) -> None:
     lines = [line.split() for line in printed(probed).splitlines()]
-    first = next(words for words in lines if len(words) == 12 and words[0] == "0")
+    first = next(words for words in lines if len(words) == 7 and words[0] == "0")
     assert first[1:4] == ["0.300", "-", "-"]
+
+
+def test_a_distance_below_its_own_error_is_no_number_in_the_drift_either(probed: dict[str, Any]) -> None:
+    probed["drift"]["to_truth"] = [row(0.004)] * len(probed["drift"]["snapshots"])
+    lines = [line.split() for line in printed(probed).splitlines()]
+    assert next(words for words in lines if len(words) == 7 and words[0] == "0")[1] == "n.d."
+
+
+def test_no_number_is_cut_short_in_eighty_columns(probed: dict[str, Any]) -> None:
+    drift = printed(probed, 80).split("drift, over 50 steps")[1]
+    assert "…" not in drift
 
 
 @pytest.mark.parametrize("width", [60, 80])
