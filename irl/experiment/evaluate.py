@@ -100,7 +100,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     reward = judge_reward(rewards[steps], judged, command.seed)
     drift = judge_drift(rewards, judged)
     asked = Asked(command.probe, command.probe_steps, command.also, command.seed, command.policies_root)
-    distances, more = probed(config, demos, policies, rewards, asked)
+    distances, terms, more = probed(config, demos, policies, rewards, asked)
     if not demos.held_out:
         reward["notes"].append("No demonstration is held out: the expert's steps are those trained on.")
     return {
@@ -114,6 +114,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "references": references,
         "reward": reward,
         "distances": distances,
+        "terms": terms,
         "drift": {**drift, **more},
     }
 

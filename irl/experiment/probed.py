@@ -14,6 +14,7 @@ from irl.core.types import Episode, from_episodes
 from irl.demos.load import Demos
 from irl.envs.make import make
 from irl.envs.states import StateRecorder
+from irl.experiment.attributed import judge_terms
 from irl.experiment.configs import Imitation
 from irl.experiment.distances import judge_distances
 from irl.experiment.drifting import Played, judge_snapshots
@@ -47,8 +48,8 @@ def probed(
     policies: Mapping[int, Policy],
     rewards: Mapping[int, LearnedReward],
     asked: Asked,
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The `distances` of evaluation.json, and what is added to its `drift`.
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """The `distances` and `terms` of evaluation.json, and what is added to its `drift`.
 
     Where demonstrations have no actions and the shelf no expert there is nothing to compare on: a reason.
 
@@ -59,7 +60,8 @@ def probed(
     actions = demos[0].action.shape[1] > 0
     known = shelf.expert_card(config.env_id, asked.policies_root) is not None
     if asked.probe is None and not known and not actions:
-        return {"headline_reason": "the demonstrations have no actions, and the shelf no expert"}, {}
+        reason = "the demonstrations have no actions, and the shelf no expert"
+        return {"headline_reason": reason}, {"reason": reason}, {}
     if asked.probe is not None:
         probe = given(asked.probe, config.env_id)
     else:
@@ -68,7 +70,8 @@ def probed(
     base, own = probe.base, own or dict(own_of(config.env_id, policies, asked.steps))
     reward = rewards[max(rewards)]
     distances = judge_distances(reward, base, own, asked.also, asked.seed)
-    return distances, _drift(config, demos, policies, rewards, base, asked)
+    terms = judge_terms(reward, base, reward.spec.gamma, asked.seed)
+    return distances, terms, _drift(config, demos, policies, rewards, base, asked)
 
 
 def _drift(

@@ -13,6 +13,7 @@ from irl.report.folder import lookup, number, texts
 from irl.report.palette import STRATA, STRATUM_NAMES
 from irl.report.probed import DISTANCES, DRIFT, HEALTH, distance_table, drift_table, health_table
 from irl.report.readings import MISSING, amount, key_numbers, spread
+from irl.report.terms import TERMS, terms_table
 
 
 def evaluation_table(evaluation: Mapping[str, Any]) -> Group:
@@ -25,7 +26,8 @@ def evaluation_table(evaluation: Mapping[str, Any]) -> Group:
         parts.append(_strata(evaluation))
     distances = (distance_table(evaluation), DISTANCES)
     drift = (drift_table(evaluation), DRIFT)
-    for table, legend in (distances, drift, (health_table(evaluation), HEALTH)):
+    terms, health = (terms_table(evaluation), TERMS), (health_table(evaluation), HEALTH)
+    for table, legend in (distances, terms, drift, health):
         if table is not None:
             parts += [table, Padding(Text(legend, style="dim"), (0, 1))]
     for part in ("policy.notes", "reward.notes", "distances.notes", "drift.notes", "notes"):

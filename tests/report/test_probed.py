@@ -96,6 +96,20 @@ def test_they_fit_the_terminal(probed: dict[str, Any], width: int) -> None:
     assert max(len(line) for line in printed(probed, width).splitlines()) <= width
 
 
+def test_terms_have_weights_or_the_reason_why_not(evaluation: dict[str, Any]) -> None:
+    known = {"weight": 0.37, "low": 0.3, "high": 0.4, "standardised": 0.8, "share": 0.6, "why_not": None}
+    weights = {"forward": known, "ctrl": {**known, "why_not": "it is 3e-07 of the variance here"}}
+    more = {"explained": 0.9, "shaping": 0.2, "survival_bonus": 0.75, "reason": None}
+    evaluation["terms"] = {"weights": weights} | more
+    text = printed(evaluation, 80)
+    for expected in ("0.370", "0.3 to 0.4", "0.80", "it is 3e-07", "+0.75", "0.90"):
+        assert expected in text, expected
+    (of_ctrl,) = [line for line in text.splitlines() if line.strip().startswith("ctrl")]
+    assert "0.370" not in of_ctrl
+    evaluation["terms"] = {"reason": "no terms"}
+    assert "what it pays for" not in printed(evaluation)
+
+
 def test_a_file_without_them_has_no_such_tables(evaluation: dict[str, Any]) -> None:
     assert "own error" not in printed(evaluation)
     evaluation["distances"] = {"curve": "x"}
