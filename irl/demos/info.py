@@ -43,13 +43,16 @@ class DemosInfo:
     expert_return: float | None
 
 
-def show(dataset_id: str, root: Path | str | None = None) -> DemosInfo:
+def show(dataset_id: str, root: Path | str | None = None, obs_keys: Sequence[str] = ()) -> DemosInfo:
     """What the dataset holds; reads all of it.
+
+    Args:
+        obs_keys: parts of observations in a dictionary that are put in a row, in this order.
 
     Raises:
         UserError: not a dataset id, not there, empty or not readable.
     """
-    dataset = open_dataset(dataset_id, root)
+    dataset = open_dataset(dataset_id, root, tuple(obs_keys))
     episodes = read_episodes(dataset, root)
     returns, lengths = [e.return_ for e in episodes], [len(e) for e in episodes]
     return DemosInfo(

@@ -111,7 +111,8 @@ def _obs_space(metadata: Mapping[str, Any], keys: tuple[str, ...]) -> Box:
     if isinstance(space, Dict):
         raise UserError(
             f"it has the observations {' '.join(str(space).split()):.120}; expected a flat Box of real "
-            f"numbers: name the parts to be put in a row, obs_keys={list(space.spaces)!r:.200}"
+            f"numbers: name the parts to be put in a row, in Python obs_keys={list(space.spaces)!r:.100}, with "
+            f"`irl demos` --obs-keys {' '.join(map(str, space.spaces)):.100}"
         )
     check_flat("it", "observations", space)
     return space

@@ -16,7 +16,7 @@ from irl.demos.storage import list_datasets
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.experiment import actors
-from irl.experiment.configs import Words
+from irl.experiment.configs import Keys, Words
 from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 
@@ -64,6 +64,8 @@ class ShowDemos:
 
     dataset_id: tyro.conf.Positional[str]
     """Name of the dataset."""
+    obs_keys: Keys = ()
+    """Parts of observations in a dictionary, to be put in a row."""
     datasets_root: Path | None = None
     """Folder of Minari datasets."""
 
@@ -112,7 +114,7 @@ def generate_demos(command: GenerateDemos) -> None:
 
 def show_demos(command: ShowDemos) -> None:
     """Print what a dataset holds."""
-    Console().print(table(show(command.dataset_id, command.datasets_root)))
+    Console().print(table(show(command.dataset_id, command.datasets_root, command.obs_keys)))
 
 
 def list_demos(command: ListDemos) -> None:

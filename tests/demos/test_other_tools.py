@@ -9,6 +9,7 @@ from irl.core.types import Episode
 from irl.demos.importers import import_file
 from irl.demos.load import load_demos
 from irl.envs.make import make
+from tests import pointmass
 
 DATA = Path(__file__).parent / "data"
 
@@ -45,3 +46,13 @@ def test_d4rl(name: str, lengths: list[int], terminated: list[int], said: tuple,
     assert all(episode.terminated != episode.truncated for episode in demos)
     # the n-th was reset with seed n, and float32 was written
     assert max(largest_error(episode, seed) for seed, episode in enumerate(demos)) < 1e-5
+
+
+def test_lerobot(tmp_path: Path) -> None:
+    info, notes = import_file(DATA / "lerobot.parquet", "PointMass-v0", dataset_id="a-v0", root=tmp_path)
+    assert (info.episodes, info.steps) == (3, 87)
+    assert "3 actions and 0 terminations are left out" in notes[0]
+    for found, made in zip(load_demos("a-v0", root=tmp_path), pointmass.demonstrations(3), strict=True):
+        np.testing.assert_allclose(found.obs, made.obs[:-1], atol=1e-7)
+        np.testing.assert_allclose(found.action, made.action[:-1], atol=1e-7)
+        np.testing.assert_allclose(found.reward, made.reward[:-1], atol=1e-7)
