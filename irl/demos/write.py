@@ -174,7 +174,9 @@ def _buffer(episode: Episode, at_reset: Mapping[str, float], origin: Origin) -> 
     """The episode as Minari stores it; infos have one row more than steps, the reset's first."""
     task = task_of(origin.env_id) if origin.env_id is not None else None
     keys = {name: key for key, name in task.terms.items()} if task is not None else {}
-    infos = {keys[name]: np.concatenate([[0.0], values]) for name, values in episode.terms.items()}
+    # a constant of the task has no key, and is known without
+    told = {keys[name]: values for name, values in episode.terms.items() if name in keys}
+    infos = {key: np.concatenate([[0.0], values]) for key, values in told.items()}
     for key, values in episode.infos.items():
         infos[key] = np.concatenate([[at_reset.get(key, np.nan)], values])
     ended = np.zeros(len(episode), dtype=bool)
