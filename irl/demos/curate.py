@@ -11,6 +11,7 @@ from irl.core.rng import stream
 from irl.core.types import Episode
 from irl.demos.info import DemosInfo, show
 from irl.demos.metadata import Dataset
+from irl.demos.recording import together
 from irl.demos.storage import open_dataset, read_episodes
 from irl.demos.write import Labels, Origin, check_target, write
 from irl.envs.discrete import OneHot
@@ -54,6 +55,7 @@ def merge(
         f"merged of {', '.join(dataset_ids)}",
         _same([d.random_return for d in datasets]),
         _same([d.expert_return for d in datasets]),
+        together([d.recorded for d in datasets]),
     )
     write(target, into, root, episodes, _origin(first), labels)
     return show(into, root)
@@ -99,7 +101,7 @@ def _write_part(
     dataset: Dataset, part: list[Episode], name: str, target: Path, root: Path | str | None, words: str
 ) -> None:
     returns = dataset.random_return, dataset.expert_return
-    labels = Labels(dataset.algorithm, dataset.author, words, *returns)
+    labels = Labels(dataset.algorithm, dataset.author, words, *returns, dataset.recorded)
     write(target, name, root, part, _origin(dataset), labels)
 
 

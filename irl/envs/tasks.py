@@ -32,9 +32,7 @@ class Task:
     """Terms that no `info` key tells, the same at every step."""
 
 
-def _row(
-    env_id: str, terms: tuple[str, ...], infos: tuple[str, ...], hides: str, **constants: float
-) -> Task:
+def _row(env_id: str, terms: tuple[str, ...], infos: tuple[str, ...], hides: str, **constants: float) -> Task:
     named = {key: key.removeprefix("reward_") for key in terms}
     name = env_id.split("-")[0].lower()
     return Task(env_id, name, MappingProxyType(named), infos, hides, MappingProxyType(constants))

@@ -1,4 +1,4 @@
-"""How the terms of each MuJoCo task follow from its steps: all but one from (s', a, terminated), that one as rest.
+"""How the terms of each MuJoCo task follow from its steps: from (a, s', terminated) all but one, the rest.
 
     task                       rest       the others
     Hopper, Walker2d           forward    ctrl = -w |a|^2,  survive = h if not terminated
@@ -106,8 +106,8 @@ def _double(e: Episode, w: Weights) -> Terms:
     v = e.obs[1:, 6:8]
     if (fast := np.abs(v) >= _CLIP).any():
         raise UserError(
-            f"the velocity at step {int(np.argmax(fast.any(axis=1)))} is at {_CLIP:g}, where the observation cuts it "
-            f"off: the terms of InvertedDoublePendulum-v5 cannot be told from these steps"
+            f"the velocity at step {int(np.argmax(fast.any(axis=1)))} is at {_CLIP:g}, where the observation "
+            f"cuts it off: the terms of InvertedDoublePendulum-v5 cannot be told from these steps"
         )
     penalty = 1e-3 * v[:, 0] ** 2 + 5e-3 * v[:, 1] ** 2
     return {"survive": _survive(e, w["healthy_reward"]), "velocity_penalty": -penalty}
@@ -131,7 +131,5 @@ RULES: dict[str, Rule] = {
     "Pusher-v5": Rule("dist", _pusher, 23, {"reward_control_weight": 0.1, "reward_near_weight": 0.5}),
     "InvertedPendulum-v5": Rule("survive", lambda e, w: {}, 4, {}),
     "InvertedDoublePendulum-v5": Rule("distance_penalty", _double, 9, {"healthy_reward": 10.0}),
-    "HumanoidStandup-v5": Rule(
-        "linup", _standup, 348, {"ctrl_cost_weight": 0.1, "impact_cost_weight": 5e-7}
-    ),
+    "HumanoidStandup-v5": Rule("linup", _standup, 348, {"ctrl_cost_weight": 0.1, "impact_cost_weight": 5e-7}),
 }

@@ -3,9 +3,9 @@
     reward = sum of terms                                        in every task of `irl.envs.tasks`
     rest   = reward - sum of the others                          the one term that a step alone does not tell
 
-A live environment tells its terms in `info`. A dataset without infos still holds all but one of them: costs are
-functions of the action and of the next observation, survival is the absence of a termination, and what is left
-of the reward is the last.
+A live environment tells its terms in `info`. A dataset without infos still holds all but one of them: costs
+are functions of the action and of the next observation, survival is the absence of a termination, and what is
+left of the reward is the last (`irl.rewards.from_steps`).
 """
 
 from collections.abc import Mapping
@@ -21,6 +21,7 @@ from irl.core.types import Episode, Transitions
 from irl.envs.names import split_name
 from irl.envs.tasks import Task, task_of
 from irl.rewards.from_steps import NO_MATTER, RULES, Weights
+
 
 @dataclass(frozen=True)
 class HandWritten:
@@ -82,8 +83,8 @@ def with_terms(episode: Episode, env_id: str) -> Episode:
     rule, weights, steps = RULES[task.env_id], _weights(env_id), len(episode)
     if episode.obs.shape[1] != rule.obs_size or not np.isfinite(episode.reward).all():
         raise UserError(
-            f"an episode with observations of {episode.obs.shape[1]} and a return of {episode.return_:g} does "
-            f"not tell the terms of {task.env_id}; expected observations of {rule.obs_size}, and rewards"
+            f"an episode with observations of {episode.obs.shape[1]} and a return of {episode.return_:g} "
+            f"does not tell the terms of {task.env_id}; expected observations of {rule.obs_size}, and rewards"
         )
     constants = {name: np.full(steps, value) for name, value in task.constants.items()}
     known = rule.others(episode, weights) | constants
@@ -110,7 +111,7 @@ def _weights(env_id: str) -> Weights:
     own = RULES[bare].weights
     if unknown := sorted(given.keys() - own.keys() - NO_MATTER):
         raise UserError(
-            f"with {', '.join(unknown)} the terms of {bare} cannot be told from its steps; record them, as irl "
-            f"demos generate does"
+            f"with {', '.join(unknown)} the terms of {bare} cannot be told from its steps; record them, as "
+            f"irl demos generate does"
         )
     return own | {name: float(value) for name, value in given.items() if name in own}

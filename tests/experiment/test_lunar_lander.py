@@ -1,4 +1,4 @@
-"""LunarLander, a task of Box2D's with a choice of actions: demonstrated, imported, learned from, evaluated."""
+"""LunarLander, a task of Box2D's with a choice of actions: demonstrated, imported, learned from."""
 
 import json
 from collections.abc import Callable
