@@ -114,4 +114,4 @@ def _weights(env_id: str) -> Weights:
             f"with {', '.join(unknown)} the terms of {bare} cannot be told from its steps; record them, as "
             f"irl demos generate does"
         )
-    return own | {name: float(value) for name, value in given.items() if name in own}
+    return {**own, **{name: float(value) for name, value in given.items() if name in own}}

@@ -1,5 +1,7 @@
 """What is done to a policy's actions is what was asked for, and the same for the same episode."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -77,6 +79,6 @@ def test_a_choice_has_random_actions_and_no_noise() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"noise": -0.1}, {"noise": np.inf}, {"random": 1.1}, {"random": -0.1}])
-def test_what_cannot_be(wrong: dict[str, float]) -> None:
+def test_what_cannot_be(wrong: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="must"):
         Behaviour(**wrong)
