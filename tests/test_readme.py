@@ -38,3 +38,10 @@ def test_every_command_it_names_exists() -> None:
     known = set(COMMANDS) | {name[:1] for name in COMMANDS}
     assert {name for name in named if name not in known and name[:1] not in COMMANDS} == set()
     assert named
+
+
+def test_its_table_of_experts_is_that_of_the_shelf(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("IRL_POLICIES_PATH", raising=False)
+    main(["experts", "list", "--markdown"])
+    printed = [line.strip() for line in capsys.readouterr().out.splitlines() if line.strip()]
+    assert [line for line in printed if line not in README.read_text()] == []

@@ -11,17 +11,26 @@ from irl.core.rng import stream
 from irl.core.types import Episode
 from irl.demos.info import DemosInfo, show
 from irl.demos.metadata import Dataset
+from irl.demos.recording import together
 from irl.demos.storage import open_dataset, read_episodes
 from irl.demos.write import Labels, Origin, check_target, write
 from irl.envs.discrete import OneHot
 
 
 def merge(
-    dataset_ids: Sequence[str], into: str, *, root: Path | str | None = None, overwrite: bool = False
+    dataset_ids: Sequence[str],
+    into: str,
+    *,
+    root: Path | str | None = None,
+    obs_keys: Sequence[str] = (),
+    overwrite: bool = False,
 ) -> DemosInfo:
     """All episodes of the datasets, in order, as a new one.
 
     Reference returns stay where all have the same.
+
+    Args:
+        obs_keys: parts of observations in a dictionary, which the new dataset has in a row, in this order.
 
     Raises:
         UserError: fewer than two, one is given twice, or they are of different tasks or spaces.
@@ -29,7 +38,7 @@ def merge(
     if len(set(dataset_ids)) < max(len(dataset_ids), 2):
         raise UserError(f"{len(dataset_ids)} datasets to merge; expected two or more, each once")
     target = check_target(into, root, overwrite)
-    datasets = [open_dataset(name, root) for name in dataset_ids]
+    datasets = [open_dataset(name, root, tuple(obs_keys)) for name in dataset_ids]
     first = datasets[0]
     for other in datasets[1:]:
         for what in ("env_id", "obs_space", "action_space"):
@@ -46,6 +55,7 @@ def merge(
         f"merged of {', '.join(dataset_ids)}",
         _same([d.random_return for d in datasets]),
         _same([d.expert_return for d in datasets]),
+        together([d.recorded for d in datasets]),
     )
     write(target, into, root, episodes, _origin(first), labels)
     return show(into, root)
@@ -58,11 +68,15 @@ def split(
     held_out: float,
     seed: int,
     root: Path | str | None = None,
+    obs_keys: Sequence[str] = (),
     overwrite: bool = False,
 ) -> tuple[DemosInfo, DemosInfo]:
     """The episodes in two new datasets: to learn from, and a share of `held_out` drawn with `seed`.
 
     At least one episode goes to each side; with one seed a smaller share is a subset of a larger one.
+
+    Args:
+        obs_keys: parts of observations in a dictionary, which the new datasets have in a row, in this order.
 
     Raises:
         UserError: there is only one episode, or the names are the same.
@@ -70,7 +84,7 @@ def split(
     if into[0] == into[1]:
         raise UserError(f"both parts would be called {into[0]!r}; choose two names")
     targets = [check_target(name, root, overwrite) for name in into]
-    dataset = open_dataset(dataset_id, root)
+    dataset = open_dataset(dataset_id, root, tuple(obs_keys))
     if (n := dataset.episodes) < 2:
         raise UserError(f"{dataset_id} has {n} episodes; expected at least 2 to split")
     episodes = read_episodes(dataset, root)
@@ -87,7 +101,7 @@ def _write_part(
     dataset: Dataset, part: list[Episode], name: str, target: Path, root: Path | str | None, words: str
 ) -> None:
     returns = dataset.random_return, dataset.expert_return
-    labels = Labels(dataset.algorithm, dataset.author, words, *returns)
+    labels = Labels(dataset.algorithm, dataset.author, words, *returns, dataset.recorded)
     write(target, name, root, part, _origin(dataset), labels)
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from irl.core.types import Episode
 from irl.envs.discrete import OneHot
 from irl.envs.flatten import flat_rows
-from irl.envs.tasks import Task
+from irl.envs.tasks import Task, terms_among
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,9 @@ def to_episode(columns: Columns, index: int, layout: Layout) -> Episode:
     ends = np.flatnonzero(terminated | truncated)
     if len(ends) and ends[0] != steps - 1:
         raise ValueError(f"episode {index} ends at step {ends[0]} and goes on to step {steps - 1}")
-    infos, task = _scalars(columns.infos, steps), layout.task
-    known = task is not None and all(key in infos for key in task.terms)
-    terms = task.terms if task is not None and known else {}
+    infos = _scalars(columns.infos, steps)
+    terms = terms_among(layout.task, infos)
+    told = layout.task.terms if layout.task is not None and terms else {}
     obs = _row_each(columns.observations, index, layout.obs_keys)
     _check_shape(obs, "observations", index, (steps + 1, layout.obs_size))
     episode = Episode(
@@ -69,8 +69,8 @@ def to_episode(columns: Columns, index: int, layout: Layout) -> Episode:
         terminated=bool(terminated[-1]),
         # an episode that nothing ended was cut off by the recording
         truncated=bool(truncated[-1]) or not terminated[-1],
-        terms={name: infos[key] for key, name in terms.items()},
-        infos={key: values for key, values in infos.items() if key not in terms},
+        terms=terms,
+        infos={key: values for key, values in infos.items() if key not in told},
         seed=columns.seed,
     )
     unpaid = bool(np.isnan(episode.reward).all())

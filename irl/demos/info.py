@@ -8,6 +8,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from irl.demos.recording import Recorded
 from irl.demos.storage import open_dataset, read_episodes
 
 
@@ -41,15 +42,20 @@ class DemosInfo:
     description: str | None
     random_return: float | None
     expert_return: float | None
+    recorded: Recorded | None
+    """How a policy's episodes were made, and which were dropped."""
 
 
-def show(dataset_id: str, root: Path | str | None = None) -> DemosInfo:
+def show(dataset_id: str, root: Path | str | None = None, obs_keys: Sequence[str] = ()) -> DemosInfo:
     """What the dataset holds; reads all of it.
+
+    Args:
+        obs_keys: parts of observations in a dictionary that are put in a row, in this order.
 
     Raises:
         UserError: not a dataset id, not there, empty or not readable.
     """
-    dataset = open_dataset(dataset_id, root)
+    dataset = open_dataset(dataset_id, root, tuple(obs_keys))
     episodes = read_episodes(dataset, root)
     returns, lengths = [e.return_ for e in episodes], [len(e) for e in episodes]
     return DemosInfo(
@@ -72,6 +78,7 @@ def show(dataset_id: str, root: Path | str | None = None) -> DemosInfo:
         description=dataset.description,
         random_return=dataset.random_return,
         expert_return=dataset.expert_return,
+        recorded=dataset.recorded,
     )
 
 
@@ -92,6 +99,7 @@ def table(info: DemosInfo) -> Table:
         "reward terms": ", ".join(info.terms) or "none recorded",
         "also recorded": ", ".join(info.infos) or "nothing",
         "made by": info.algorithm or "unknown",
+        **({"played": info.recorded.words} if info.recorded is not None else {}),
         "size": f"{info.size_bytes / 1e6:.1f} MB",
         "folder": str(info.path),
     }

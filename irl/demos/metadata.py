@@ -15,6 +15,7 @@ from irl.core.config import from_json
 from irl.core.errors import UserError
 from irl.demos.arrow import FORMATS
 from irl.demos.episodes import Layout
+from irl.demos.recording import Recorded
 from irl.envs.flatten import flat_space
 from irl.envs.make import check_flat
 from irl.envs.tasks import task_of
@@ -22,6 +23,8 @@ from irl.envs.tasks import task_of
 METADATA = "metadata.json"
 DIGEST = "irl_data_sha256"
 """Key of the metadata with the SHA-256 of the data: damaged HDF5 can take the whole process down."""
+RECORDED = "irl_recorded"
+"""Key of the metadata with what `irl.demos.recording` says of the episodes."""
 LONGEST_ID = 200
 
 
@@ -49,6 +52,8 @@ class Dataset:
     """Mean return of random actions, the zero of a normalised score."""
     expert_return: float | None
     """Mean return of the expert, the one of a normalised score."""
+    recorded: Recorded | None
+    """How a policy's episodes were made; None where irl did not make them."""
     digest: str | None
 
     @property
@@ -94,6 +99,7 @@ def parse(dataset_id: str, path: Path, content: Any, obs_keys: tuple[str, ...]) 
         description=optional(str, "description"),
         random_return=optional(float, "ref_min_score"),
         expert_return=optional(float, "ref_max_score"),
+        recorded=optional(Recorded, RECORDED),
         digest=optional(str, DIGEST),
     )
 
@@ -111,7 +117,8 @@ def _obs_space(metadata: Mapping[str, Any], keys: tuple[str, ...]) -> Box:
     if isinstance(space, Dict):
         raise UserError(
             f"it has the observations {' '.join(str(space).split()):.120}; expected a flat Box of real "
-            f"numbers: name the parts to be put in a row, obs_keys={list(space.spaces)!r:.200}"
+            f"numbers: name the parts to be put in a row, in Python obs_keys={list(space.spaces)!r:.100}, "
+            f"with `irl demos` --obs-keys {' '.join(map(str, space.spaces)):.100}"
         )
     check_flat("it", "observations", space)
     return space

@@ -18,10 +18,12 @@ from minari.data_collector import EpisodeBuffer
 from minari.namespace import NAMESPACE_METADATA_FILENAME
 
 from irl.core import files
+from irl.core.config import to_json
 from irl.core.errors import UserError
 from irl.core.types import Episode
 from irl.demos.hdf5 import DATA
-from irl.demos.metadata import DIGEST, METADATA
+from irl.demos.metadata import DIGEST, METADATA, RECORDED
+from irl.demos.recording import Recorded
 from irl.demos.root import datasets_root, minari_at
 from irl.demos.storage import check_id
 from irl.envs.discrete import OneHot
@@ -54,6 +56,8 @@ class Labels:
     """Mean return of random actions, the zero of a normalised score."""
     expert_return: float | None = None
     """Mean return of the expert, the one of a normalised score."""
+    recorded: Recorded | None = None
+    """How a policy's episodes were made, and which were dropped."""
 
 
 def origin_of(env: gym.Env) -> Origin:
@@ -150,6 +154,7 @@ def write(
 def _more(origin: Origin, labels: Labels) -> dict[str, Any]:
     """Metadata that Minari would make the environment once more for."""
     more = {
+        RECORDED: to_json(labels.recorded),
         "env_spec": origin.env_spec,
         "ref_min_score": labels.random_return,
         "ref_max_score": labels.expert_return,
@@ -174,7 +179,9 @@ def _buffer(episode: Episode, at_reset: Mapping[str, float], origin: Origin) -> 
     """The episode as Minari stores it; infos have one row more than steps, the reset's first."""
     task = task_of(origin.env_id) if origin.env_id is not None else None
     keys = {name: key for key, name in task.terms.items()} if task is not None else {}
-    infos = {keys[name]: np.concatenate([[0.0], values]) for name, values in episode.terms.items()}
+    # a constant of the task has no key, and is known without
+    told = {keys[name]: values for name, values in episode.terms.items() if name in keys}
+    infos = {key: np.concatenate([[0.0], values]) for key, values in told.items()}
     for key, values in episode.infos.items():
         infos[key] = np.concatenate([[at_reset.get(key, np.nan)], values])
     ended = np.zeros(len(episode), dtype=bool)

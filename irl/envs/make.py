@@ -69,6 +69,8 @@ def _made(env_id: str, kwargs: dict[str, Any]) -> gym.Env:
     with warnings.catch_warnings(), _quiet_compiler():
         # "out of date", "did you mean": said in our own words where it is a mistake
         warnings.filterwarnings("ignore", message=r"(\x1b\[\d+m)?WARN: ")
+        # Box2D's import ends the process where a warning is an error, and this is one of SWIG's
+        warnings.filterwarnings("ignore", message="builtin type swig", category=DeprecationWarning)
         try:
             # an id without a version would be recorded under a name that is not the environment's
             if env_id not in gym.registry and ":" not in env_id:

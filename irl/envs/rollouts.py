@@ -12,7 +12,7 @@ from jaxtyping import Float
 from irl.core.types import ActFn, Episode
 from irl.envs.discrete import OneHot
 from irl.envs.make import make
-from irl.envs.tasks import task_of
+from irl.envs.tasks import task_of, terms_among
 
 
 def rollout(env: gym.Env, act: ActFn, seed: int) -> Episode:
@@ -134,7 +134,7 @@ def _named(
 ) -> tuple[dict[str, Float[np.ndarray, "T"]], dict[str, Float[np.ndarray, "T"]]]:
     """Columns by term name, and the other ones worth keeping."""
     task = task_of(env.spec.id) if env.spec is not None else None
-    if task is None or any(key not in columns for key in task.terms):
+    terms = terms_among(task, columns)
+    if task is None or not terms:
         return {}, columns
-    terms = {name: columns[key] for key, name in task.terms.items()}
     return terms, {key: columns[key] for key in task.infos if key in columns}

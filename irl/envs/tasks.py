@@ -1,6 +1,7 @@
 """The MuJoCo tasks: what each pays for, under which `info` keys it says so, and what its observation hides.
 
-In every row the named terms add up to the environment's reward (they are signed: a cost is negative).
+In every row the named terms and the constants add up to the environment's reward (they are signed: a cost is
+negative).
 The keys were read off gymnasium 1.4.0; a test holds each row against the live environment.
 """
 
@@ -9,6 +10,9 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+
+import numpy as np
+from jaxtyping import Float
 
 
 @dataclass(frozen=True)
@@ -24,11 +28,14 @@ class Task:
     """Other scalar `info` keys worth recording."""
     hides: str
     """What moves the reward but is not in the observation."""
+    constants: Mapping[str, float]
+    """Terms that no `info` key tells, the same at every step."""
 
 
-def _row(env_id: str, terms: tuple[str, ...], infos: tuple[str, ...], hides: str) -> Task:
+def _row(env_id: str, terms: tuple[str, ...], infos: tuple[str, ...], hides: str, **constants: float) -> Task:
     named = {key: key.removeprefix("reward_") for key in terms}
-    return Task(env_id, env_id.split("-")[0].lower(), MappingProxyType(named), infos, hides)
+    name = env_id.split("-")[0].lower()
+    return Task(env_id, name, MappingProxyType(named), infos, hides, MappingProxyType(constants))
 
 
 _PLANAR = ("x_position", "z_distance_from_origin", "x_velocity")
@@ -99,7 +106,25 @@ TASKS: tuple[Task, ...] = (
         (),
         "velocities beyond +-10, which velocity_penalty does not clip",
     ),
+    _row(
+        "HumanoidStandup-v5",
+        ("reward_linup", "reward_quadctrl", "reward_impact"),
+        ("x_position", "y_position", "z_distance_from_origin"),
+        "nothing: the height of the torso is in the observation",
+        alive=1.0,
+    ),
 )
+
+
+def terms_among(
+    task: Task | None, infos: Mapping[str, Float[np.ndarray, "T"]]
+) -> dict[str, Float[np.ndarray, "T"]]:
+    """The task's terms by name, of T steps' infos by `info` key; none where one of them is missing."""
+    if task is None or any(key not in infos for key in task.terms):
+        return {}
+    terms = {name: infos[key] for key, name in task.terms.items()}
+    steps = len(next(iter(terms.values())))
+    return terms | {name: np.full(steps, value) for name, value in task.constants.items()}
 
 
 def task_of(env_id: str) -> Task | None:

@@ -11,7 +11,18 @@ import tyro
 from rich.console import Console
 
 from irl.core.errors import UserError
-from irl.experiment import demonstrations, evaluate, experts, export, imports, probes, retrain, train
+from irl.experiment import (
+    demonstrations,
+    evaluate,
+    experts,
+    export,
+    generation,
+    imports,
+    probes,
+    retrain,
+    shelved,
+    train,
+)
 from irl.experiment.configs import AIRLRun, AIRLSACRun, DACRun, GAILRun, GAILSACRun
 from irl.experiment.modules import import_named
 from irl.experiment.play import Interrupted
@@ -19,7 +30,7 @@ from irl.experiment.play import Interrupted
 Run = Callable[[Any], None]
 
 COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
-    ("demos", "generate"): (demonstrations.GenerateDemos, demonstrations.generate_demos),
+    ("demos", "generate"): (generation.GenerateDemos, generation.generate_demos),
     ("demos", "import"): (imports.ImportDemos, imports.import_demos),
     ("demos", "merge"): (imports.MergeDemos, imports.merge_demos),
     ("demos", "split"): (imports.SplitDemos, imports.split_demos),
@@ -36,8 +47,8 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("retrain",): (retrain.Retrain, retrain.retrain),
     ("export",): (export.Export, export.export),
     ("experts", "train"): (experts.TrainExpert, experts.train),
-    ("experts", "evaluate"): (experts.EvaluateExpert, experts.evaluate),
-    ("experts", "list"): (experts.ListExperts, experts.list_experts),
+    ("experts", "evaluate"): (shelved.EvaluateExpert, shelved.evaluate),
+    ("experts", "list"): (shelved.ListExperts, shelved.list_experts),
 }
 
 _FULL = "; free some space, or choose a folder on another disk"

@@ -19,6 +19,7 @@ from irl.learners.sac import SACConfig
 
 Run = TypeVar("Run", bound="ImitationRun")
 Words = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE ...")]
+Keys = Annotated[tuple[str, ...], tyro.conf.arg(metavar="KEY ...")]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""`irl experts`: train a policy on a task's own reward, measure it, put it on the shelf."""
+"""`irl experts train`: a policy trained on a task's own reward, measured, put on the shelf."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -6,31 +6,24 @@ from pathlib import Path
 from typing import Literal
 
 import torch
-from rich import box
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from irl.core import records
 from irl.core.config import check_at_least, check_seed, check_threads, from_json, to_json
 from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment, versions
-from irl.core.rng import episode_seeds
 from irl.envs.make import check_module, make
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import ExpertRun, Watch, Words
 from irl.experiment.play import MAY_CHANGE, Player
-from irl.experiment.progress import each_episode, progress
 from irl.experiment.recipes import recipe
+from irl.experiment.shelved import EPISODES, Row, measured_of, shelf_table
 from irl.policies import shelf
-from irl.policies.card import Card, Measurement, measure, measure_random
+from irl.policies.card import Card, measure_random
 from irl.policies.policy import Policy, load_policy, save_policy
-
-EPISODES = 20
-"""Episodes that a card is measured on."""
 
 
 @dataclass(frozen=True)
@@ -72,34 +65,6 @@ class TrainExpert:
             raise ValueError("name the task with --env-id, or a run to go on with by --resume")
         if self.steps is not None:
             check_at_least(self, 1, "steps")
-
-
-@dataclass(frozen=True)
-class EvaluateExpert:
-    """Measure policies of the shelf again, in the episodes of their cards or in fresh ones."""
-
-    env_id: str | None = None
-    """Only this task."""
-    level: str = "expert"
-    """Only this level."""
-    episodes: int = EPISODES
-    """How many episodes."""
-    seed: int = 0
-    """Draws the episodes; 20 of seed 0 are those of the card."""
-    policies_root: Path | None = None
-    """Where the shelf is; expert_data/policies unless given."""
-
-    def __post_init__(self) -> None:
-        check_at_least(self, 1, "episodes")
-        check_seed(self.seed)
-
-
-@dataclass(frozen=True)
-class ListExperts:
-    """Show the shelf."""
-
-    policies_root: Path | None = None
-    """Where the shelf is; expert_data/policies unless given."""
 
 
 def train(command: TrainExpert) -> None:
@@ -179,7 +144,7 @@ def _open_or_create(run: ExpertRun) -> records.RunFolder:
 
 def _shelve(run: ExpertRun, policy: Policy, steps: int, command: TrainExpert) -> None:
     console = Console()
-    measured = _measured(run.env_id, policy, EPISODES, 0)
+    measured = measured_of(run.env_id, policy, EPISODES, 0)
     random = measure_random(run.env_id)
     card = Card(
         env_id=run.env_id,
@@ -195,54 +160,10 @@ def _shelve(run: ExpertRun, policy: Policy, steps: int, command: TrainExpert) ->
         command=command_line(),
     )
     shelf.write(run.out / "policy", policy, card)
-    console.print(_table([(card, measured)]))
+    console.print(shelf_table([Row(card, measured, run.out / "policy")]))
     place = shelf.writable_root(command.policies_root) / task_name(run.env_id) / run.level
     if (place / shelf.CARD).is_file() and not command.overwrite:
         console.print(f"{place} holds a policy already; kept. The new one is in {run.out / 'policy'}")
         return
     shelf.write(place, policy, card)
     console.print(f"shelved as {place}")
-
-
-def _measured(env_id: str, policy: Policy, n: int, seed: int) -> Measurement:
-    with progress(f"measuring {env_id}", n) as report:
-        return measure(env_id, policy, episode_seeds(seed, "card", n), each_episode(report))
-
-
-def evaluate(command: EvaluateExpert) -> None:
-    """Measure again what the shelf holds and print it beside the cards' means."""
-    root, level = command.policies_root, command.level
-    tasks = [card.env_id for card in shelf.cards(root) if card.level == level]
-    rows = []
-    for env_id in [command.env_id] if command.env_id else tasks or ["Hopper-v5"]:
-        found = shelf.find(env_id, level, root)
-        rows.append((found.card, _measured(env_id, found.policy, command.episodes, command.seed)))
-    Console().print(_table(rows))
-
-
-def list_experts(command: ListExperts) -> None:
-    """Print the cards of the shelf."""
-    cards = shelf.cards(command.policies_root)
-    if not cards:
-        roots = ", ".join(str(root) for root in shelf.roots(command.policies_root))
-        raise UserError(f"no policies in {roots}; train one with: irl experts train --env-id Hopper-v5")
-    Console().print(_table([(card, card.measured) for card in cards]))
-
-
-def _table(rows: list[tuple[Card, Measurement]]) -> Table:
-    n = rows[0][1].episodes if rows else 0
-    title = f"deterministic policies over {n} episodes: return mean ± std, worst; length mean (shortest)"
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    for column in ("task", "made by", "return", "worst", "length", "random"):
-        table.add_column(column, no_wrap=True)
-    for card, m in rows:
-        table.add_row(
-            # escaped: what a card says is not markup
-            escape(card.env_id if card.level == "expert" else f"{card.env_id} {card.level}"),
-            escape(f"{card.algorithm} {card.steps / 1e6:.3g}M"),
-            f"{m.return_mean:.1f} ± {m.return_std:.1f}",
-            f"{m.return_min:.1f}",
-            f"{m.length_mean:.0f} ({m.length_min})",
-            f"{card.random_return_mean:.1f}",
-        )
-    return table

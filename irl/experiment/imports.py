@@ -16,7 +16,7 @@ from irl.demos.importers import import_file
 from irl.demos.info import table
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
-from irl.experiment.configs import Words
+from irl.experiment.configs import Keys, Words
 from irl.experiment.judge import finite
 from irl.policies.card import measure_random
 
@@ -53,6 +53,8 @@ class MergeDemos:
     """Names of the datasets, of one task."""
     into: str
     """Name of the new one."""
+    obs_keys: Keys = ()
+    """Parts of observations in a dictionary, which the new one has in a row."""
     datasets_root: Path | None = None
     """Folder of Minari datasets."""
     overwrite: bool = False
@@ -71,6 +73,8 @@ class SplitDemos:
     """Draws which."""
     into: tuple[str, str] | None = None
     """Names of the two; those of the dataset with -train and -held-out before the version unless given."""
+    obs_keys: Keys = ()
+    """Parts of observations in a dictionary, which the two have in a row."""
     datasets_root: Path | None = None
     """Folder of Minari datasets."""
     overwrite: bool = False
@@ -104,8 +108,14 @@ def import_demos(command: ImportDemos) -> None:
 
 def merge_demos(command: MergeDemos) -> None:
     """Merge and describe."""
-    root = command.datasets_root
-    Console().print(table(merge(command.datasets, command.into, root=root, overwrite=command.overwrite)))
+    info = merge(
+        command.datasets,
+        command.into,
+        root=command.datasets_root,
+        obs_keys=command.obs_keys,
+        overwrite=command.overwrite,
+    )
+    Console().print(table(info))
 
 
 def split_demos(command: SplitDemos) -> None:
@@ -116,6 +126,7 @@ def split_demos(command: SplitDemos) -> None:
         held_out=command.held_out,
         seed=command.seed,
         root=command.datasets_root,
+        obs_keys=command.obs_keys,
         overwrite=command.overwrite,
     )
     for part in parts:

@@ -33,16 +33,34 @@ READ = ("policy_class", "policy_kwargs")
 
 
 class SB3Policy:
-    """Acts as the model of the zip does, deterministically."""
+    """Acts as the model of the zip does, deterministically unless it is asked for a draw."""
 
     def __init__(self, policy: BasePolicy, normalise: VecNormalize | None, name: str) -> None:
         self._policy, self._normalise, self.name = policy.eval(), normalise, name
 
     def __call__(self, obs: Float[np.ndarray, "O"]) -> np.ndarray:
         """The action in environment units; of a choice, its place."""
+        return np.asarray(self._policy.predict(self._seen(obs), deterministic=True)[0])
+
+    def sample(self, obs: Float[np.ndarray, "O"], rng: np.random.Generator) -> np.ndarray:
+        """An action drawn from the policy's own distribution.
+
+        Raises:
+            UserError: it has none, as of DQN and TD3, or one of a whole rollout (gSDE).
+        """
+        policy = self._policy
+        has = isinstance(policy, ActorCriticPolicy) or hasattr(getattr(policy, "actor", None), "action_dist")
+        if not has or getattr(getattr(policy, "actor", policy), "use_sde", False):
+            raise UserError(f"{self.name} has no distribution of single actions; leave --stochastic away")
+        with torch.random.fork_rng(devices=[]):
+            # SB3 draws from torch's global stream
+            torch.manual_seed(int(rng.integers(2**63)))
+            return np.asarray(policy.predict(self._seen(obs), deterministic=False)[0])
+
+    def _seen(self, obs: np.ndarray) -> np.ndarray:
         seen = obs if self._normalise is None else self._normalise.normalize_obs(obs)
         assert isinstance(seen, np.ndarray)
-        return np.asarray(self._policy.predict(seen.astype(np.float32), deterministic=True)[0])
+        return seen.astype(np.float32)
 
 
 def load_sb3(path: Path, env: gym.Env, vec_normalize: Path | None = None) -> SB3Policy:

@@ -26,7 +26,14 @@ from irl.core.errors import UserError
 from irl.core.nets import CLIP
 
 FORMAT, VERSION = "irl.policy", 1
-_ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
+
+
+def _relu(x: np.ndarray) -> np.ndarray:
+    return np.maximum(x, 0.0)
+
+
+# named functions, so that a policy can be sent to another process
+_ACTIVATIONS = {"tanh": np.tanh, "relu": _relu}
 _DISTRIBUTIONS = ("gaussian", "squashed_gaussian", "categorical")
 
 

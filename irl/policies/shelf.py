@@ -76,11 +76,16 @@ def find(env_id: str, level: str = "expert", root: Path | None = None) -> Shelve
 
 def cards(root: Path | None = None) -> list[Card]:
     """The card of every shelved policy; a task and level found twice counts once, as `find` would."""
-    found: dict[tuple[str, str], Card] = {}
+    return [card for card, _ in folders(root)]
+
+
+def folders(root: Path | None = None) -> list[tuple[Card, Path]]:
+    """The card of every shelved policy with its folder; see `cards`."""
+    found: dict[tuple[str, str], tuple[Card, Path]] = {}
     for folder in roots(root):
         for path in sorted(folder.glob(f"*/*/{CARD}")):
             card = read_card(path)
-            found.setdefault((card.env_id, card.level), card)
+            found.setdefault((card.env_id, card.level), (card, path.parent))
     return list(found.values())
 
 

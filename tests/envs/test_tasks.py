@@ -16,7 +16,7 @@ def test_terms_add_up_to_the_reward_and_the_infos_exist(task: Task):
     ]
     env.close()
     for episode in episodes:
-        assert set(episode.terms) == set(task.terms.values())
+        assert set(episode.terms) == {*task.terms.values(), *task.constants}
         assert set(episode.infos) == set(task.infos)
         total = np.sum(list(episode.terms.values()), axis=0)
         np.testing.assert_allclose(total, episode.reward, rtol=0, atol=1e-12)

@@ -56,6 +56,27 @@ MISTAKES = {
     "train without a method": ("train", ["irl train gail", "--resume"]),
     "an unknown command": ("imitate gail", ["imitate", "train gail"]),
     "an unknown dataset to show": ("demos show irl/hopper/nothing-v0", ["irl/hopper/nothing-v0"]),
+    "neither a task nor all": ("demos generate --episodes 1", ["--env-id", "--all"]),
+    "a task and all": (f"demos generate --env-id {TASK} --all", ["--env-id", "--all"]),
+    "all under one name": ("demos generate --all --dataset-id irl/a-v0", ["--all", "--dataset-id"]),
+    "all of a level that is not there": ("demos generate --all --level nothing", ["irl experts train"]),
+    "seeds that run backwards": (f"demos generate --env-id {TASK} --seed-range 5 3", ["seed_range", "5 3"]),
+    "more seeds than episodes": (
+        f"demos generate --env-id {TASK} --seed-range 0 9 --episodes 5",
+        ["10 seeds", "5 episodes"],
+    ),
+    "noise below nothing": (f"demos generate --env-id {TASK} --action-noise -1", ["noise", "-1"]),
+    "more than always random": (f"demos generate --env-id {TASK} --random-actions 1.5", ["0 to 1", "1.5"]),
+    "no step to learn from": (f"demos generate --env-id {TASK} --subsampling-rate 0", ["subsampling_rate"]),
+    "a function without a distribution": (
+        f"demos generate --env-id {TASK} --policy tests.pointmass:demonstrations --stochastic",
+        ["no distribution", "--stochastic"],
+    ),
+    "a function in several processes": (
+        f"demos generate --env-id {TASK} --policy a:b --workers 2",
+        ["--workers", "--policy"],
+    ),
+    "one expert and all": (f"experts evaluate --env-id {TASK} --all", ["--all", "--env-id"]),
     "a dataset that is there already": (f"demos generate --env-id {TASK}", ["overwrite"]),
 }
 

@@ -48,6 +48,21 @@ def test_the_shelf_is_listed_and_measured_again_to_the_same_numbers(
     assert "PointMass-v0" in measured
 
 
+def test_all_of_the_shelf_is_measured_into_one_table(irl: Command, capsys: pytest.CaptureFixture) -> None:
+    irl("experts", "list", "--markdown")
+    listed = capsys.readouterr().out
+    irl("experts", "evaluate", "--all", "--level", "expert", "--workers", 1, "--episodes", 1, "--markdown")
+    measured = capsys.readouterr().out
+    names = "task level made by steps return min length random size"
+    for printed in (listed, measured):
+        head, _, *rows = [line for line in printed.splitlines() if line.startswith("|")]
+        assert " ".join(head.replace("|", " ").split()) == names
+        (row,) = [[cell.strip() for cell in line.split("|")] for line in rows if "PointMass-v0" in line]
+        assert row[2:5] == ["expert", "by hand", "0M"]
+        assert row[-2].endswith(" kB")
+        assert "Hopper-v5" in printed
+
+
 def test_what_is_on_the_shelf_is_not_replaced_unasked(irl: Command, capsys: pytest.CaptureFixture) -> None:
     words = ["experts", "train", "--env-id", "Cliff-v0", "--policies-root", "shelf", "--watch.no-progress"]
     irl(*words)

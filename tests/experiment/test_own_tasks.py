@@ -15,6 +15,7 @@ from stable_baselines3 import PPO
 
 from irl.core.records import open_run
 from irl.core.types import Episode, from_episodes
+from irl.demos.load import load_demos
 from irl.envs.rollouts import rollouts
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
@@ -189,18 +190,51 @@ class InParts(gym.ObservationWrapper):
         return {"place": observation, "mode": 0}
 
 
-def test_parts_of_observations_in_a_dictionary_are_learned_from(
-    irl: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def parts(irl: Command, monkeypatch: pytest.MonkeyPatch) -> list[Episode]:
+    """The episodes of two datasets in ds, parts-v0 and again-v0, whose observations are in a dictionary."""
     spec = EnvSpec("InParts-v0", lambda **_: InParts(), disable_env_checker=True)
     monkeypatch.setitem(gym.registry, "InParts-v0", spec)
+    episodes = pointmass.demonstrations(3)
     buffers = [
-        buffer(None, {"place": e.obs, "mode": np.zeros(len(e.obs), np.int64)}, e.action)
-        for e in pointmass.demonstrations(3)
+        buffer(None, {"place": e.obs, "mode": np.zeros(len(e.obs), np.int64)}, e.action) for e in episodes
     ]
     spaces = {"observation_space": InParts().observation_space, "action_space": Box(-1, 1, (2,))}
-    written(Path("ds").resolve(), "parts-v0", buffers, "hdf5", **spaces)
-    words = ("--demos", "parts-v0", "--datasets-root", "ds", "--demo-episodes=2", "--out", "run", *QUICK)
-    irl("train", "gail", "--env-id", "InParts-v0", "--env-kwargs", '{"obs_keys": ["place"]}', *words)
+    for name in ("parts-v0", "again-v0"):
+        written(Path("ds").resolve(), name, buffers, "hdf5", **spaces)
+    return episodes
+
+
+INTO_RUN = ("--datasets-root", "ds", "--demo-episodes=2", "--out", "run", *QUICK)
+
+
+@pytest.mark.usefixtures("parts")
+def test_parts_of_observations_in_a_dictionary_are_learned_from(irl: Command) -> None:
+    task = ("--env-id", "InParts-v0", "--env-kwargs", '{"obs_keys": ["place"]}')
+    irl("train", "gail", *task, "--demos", "parts-v0", *INTO_RUN)
     irl("evaluate", "run", "--episodes", 2)
     assert load_reward(Path("run")).spec.net.obs_dim == 2
+
+
+def test_parts_of_observations_in_a_dictionary_are_shown_split_and_merged(
+    irl: Command, parts: list[Episode], capfd: pytest.CaptureFixture
+) -> None:
+    keys = ("--datasets-root", "ds", "--obs-keys", "place")
+    irl("demos", "show", "parts-v0", *keys)
+    assert "3 of 30 to 30 steps" in capfd.readouterr().out
+    irl("demos", "split", "parts-v0", "--into", "a-v0", "b-v0", *keys)
+    irl("demos", "merge", "parts-v0", "again-v0", "--into", "c-v0", *keys)
+    # in a row from then on
+    assert [len(load_demos(name, root="ds")) for name in ("a-v0", "b-v0", "c-v0")] == [2, 1, 6]
+    for found, made in zip(load_demos("c-v0", root="ds"), parts * 2, strict=True):
+        np.testing.assert_array_equal(found.obs, made.obs)
+    for words, said in (
+        (("show", "parts-v0", *keys[:2]), "--obs-keys mode place"),
+        (("show", "parts-v0", *keys, "speed"), "no real numbers 'speed'"),
+        (("show", "c-v0", *keys), "obs_keys is for those in a Dict"),
+        (("merge", "parts-v0", "c-v0", "--into", "d-v0", *keys[:2]), "--obs-keys mode place"),
+        (("split", "parts-v0", *keys, "mode"), "no real numbers 'mode'"),
+    ):
+        with pytest.raises(SystemExit):
+            irl("demos", *words)
+        assert said in capfd.readouterr().err

@@ -117,6 +117,7 @@ FILES = {
     "no episodes in the metadata": metadata(keyed(total_episodes=0), "0 episodes", "at least 1"),
     "episodes that are no number": metadata(keyed(total_episodes="six"), "total_episodes", "'six'"),
     "a score that is no number": metadata(keyed(ref_max_score=float("nan")), "ref_max_score", "nan"),
+    "made in an unknown way": metadata(keyed(irl_recorded={"how": "well"}), "irl_recorded", "missing"),
     "an author who is a number": metadata(keyed(author=[7]), "author[0]", "7"),
     "observations in a dict": data(
         space("observation", type="Dict", subspaces={"x": BOX}), "Dict", "flat Box"
