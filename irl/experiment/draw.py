@@ -9,6 +9,7 @@ from irl.core import files
 from irl.core.errors import UserError
 from irl.core.records import RunFolder
 from irl.demos.load import Demos, check_task, load_demos
+from irl.discriminators.airl import AIRLConfig
 from irl.envs.flatten import OBS_KEYS
 from irl.envs.make import check_module, make
 from irl.envs.names import split_name
@@ -34,7 +35,9 @@ def _drawn_of(config: Imitation, root: Path | None) -> Demos:
     try:
         demos = _loaded(config, root)
         check_learner(config.learner.KIND, env)
-        check_task(demos, env, seen=config.discriminator.inputs == "obs_action")
+        of = config.discriminator
+        # AIRL takes the density of the actions off, whatever g sees
+        check_task(demos, env, seen=of.inputs == "obs_action" or isinstance(of, AIRLConfig))
         env.reset(seed=config.seed)
         box = env.action_space
         assert isinstance(box, Box)

@@ -169,6 +169,12 @@ def test_demonstrations_without_actions(inputs: str, irl: Command, capfd: pytest
         irl(*words, "--demo-episodes=3", "--out", "refused")
     assert "have no actions" in (said := capfd.readouterr().err)
     assert "--discriminator.inputs obs" in said
+    with pytest.raises(SystemExit):
+        # whatever g sees, log pi is of the actions
+        irl(
+            "train", "airl", *words[2:], "--demo-episodes=3", "--discriminator.inputs=obs", "--out", "refused"
+        )
+    assert "have no actions" in capfd.readouterr().err
     irl(*words, "--demo-episodes=3", "--discriminator.inputs", inputs, "--out", "run")
     irl("evaluate", "run", "--episodes", 2)
     found = json.loads(Path("run/evaluation.json").read_text())
