@@ -1,5 +1,6 @@
 """`irl.diagnose`: a reward from anywhere held against another one on a probe.
 
+>>> import irl
 >>> probe = irl.load_probe("hopper.npz")                                          # doctest: +SKIP
 >>> print(irl.diagnose(lambda batch: batch.obs[:, 5], irl.HandWritten(), probe))  # doctest: +SKIP
 """
