@@ -106,8 +106,9 @@ def shapley(
 
 def unexplained(gram: np.ndarray, column: int, others: Sequence[int]) -> float:
     """Share of a column's variance that the others do not explain."""
-    moved = gram[np.ix_([*range(gram.shape[0] - 1)], [*range(gram.shape[0] - 1)])]
-    with_target = np.block([[moved, moved[:, [column]]], [moved[[column]], moved[[column]][:, [column]]]])
+    # the column once more, in the place of the target
+    order = [*range(len(gram) - 1), column]
+    with_target = gram[np.ix_(order, order)]
     spread = squared_error(with_target, solve(with_target, [0], [], 0.0))
     left = squared_error(with_target, solve(with_target, others, [], 0.0))
     return max(left / spread, 0.0) if spread > 0.0 else 0.0

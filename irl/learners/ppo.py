@@ -13,13 +13,10 @@ standard deviation of their discounted return; the exported policy may be a movi
 w' <- c w' + (1 - c) w after each round (Polyak & Juditsky 1992 average iterates; here with a window).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
-import torch
 from gymnasium.spaces import Box, Discrete
-from jaxtyping import Float
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
@@ -28,11 +25,11 @@ from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
 from irl.core.nets import ACTIVATIONS, Normaliser
 from irl.core.schedule import learning_rate
-from irl.core.types import Metrics, RewardFn, Transitions
+from irl.core.types import Metrics, RewardFn
 from irl.envs.discrete import OneHot
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
-from irl.learners.ppo_rollout import give_rewards, log_pi
+from irl.learners.ppo_rollout import Rollouts
 from irl.learners.ppo_update import PPOUpdate, SB3Update
 from irl.learners.random_state import read_global, write_global
 from irl.learners.vec import RecordingVecEnv
@@ -112,7 +109,7 @@ class PPOConfig:
                 raise ValueError(f"{name} must be in [0, 1), not {value}")
 
 
-class PPOLearner:
+class PPOLearner(Rollouts):
     """Collects rollouts, is told their reward, and improves the policy.
 
     SB3 draws actions and minibatches from the global numpy and torch generators, seeded here; whoever
@@ -136,7 +133,6 @@ class PPOLearner:
         self.venv = RecordingVecEnv(env_id, env_seeds, env_kwargs)
         self._running = normaliser is None
         self._scale = ReturnScale(config.n_envs, config.gamma)
-        self._batch: Transitions | None = None
         self.model = PPO(
             "MlpPolicy",
             self.venv,
@@ -171,48 +167,10 @@ class PPOLearner:
         _, self._callback = self.model._setup_learn(total_steps, callback=None)
 
     @property
-    def env_steps(self) -> int:
-        """Environment steps taken so far, over all environments."""
-        return self.model.num_timesteps
-
-    @property
-    def reward_scale(self) -> float:
-        """What the reward is divided by before PPO sees it."""
-        return self._scale.std
-
-    def take_finished(self) -> list[tuple[float, int]]:
-        """Return (the environment's own) and length of each episode that ended since the last call."""
-        return self.venv.take_finished()
-
-    @property
     def _normaliser(self) -> Normaliser:
         extractor = self.model.policy.features_extractor
         assert isinstance(extractor, NormalisedFeatures)
         return extractor.normaliser
-
-    def start(self, reward: RewardFn, before_update: Callable[[Transitions], None] | None = None) -> None:
-        """Nothing: a rollout is rewarded after it is collected.
-
-        Raises:
-            ValueError: `before_update` is given; PPO has no replay memory to draw batches from.
-        """
-        if before_update is not None:
-            raise ValueError("PPO draws no batches from a replay memory; use SAC")
-
-    def collect(self) -> Transitions:
-        """One rollout of the current policy, time-major; actions as the environment saw them."""
-        model = self.model
-        model.collect_rollouts(self.venv, self._callback, model.rollout_buffer, model.n_steps)
-        self._batch = self.venv.take().to(model.device)
-        return self._batch
-
-    @torch.no_grad()
-    def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:
-        """Log density of the batch's own actions, as the environment saw them, under the current policy.
-
-        `irl.policies.densities.clipped`; no normaliser moves and nothing is drawn.
-        """
-        return log_pi(self.model, batch)
 
     def improve(self, reward: RewardFn) -> Metrics:
         """Reward the last rollout in one batch and do PPO's gradient steps on it.
@@ -221,20 +179,13 @@ class PPOLearner:
             RuntimeError: nothing was collected since the last call.
             NotFinite: the reward, or a weight after the steps, is NaN or infinite.
         """
-        if self._batch is None:
-            raise RuntimeError("collect a rollout before improving on it")
-        batch, self._batch = self._batch, None
-        raw = give_rewards(self.model, self._scale, batch, reward)
+        batch, rewards = self.rewarded(reward)
         metrics = self._train()
         self._average.update(_actor_weights(self.model))
         if self._running:
             # after the gradient steps: within a round, old and new log pi see one normaliser
             self._normaliser.update(batch.obs)
-        return metrics | {
-            "reward/mean": float(raw.mean()),
-            "reward/std": float(raw.std()),
-            "reward/scale": self._scale.std,
-        }
+        return metrics | rewards
 
     def _train(self) -> Metrics:
         model = self.model

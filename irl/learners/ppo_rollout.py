@@ -1,16 +1,84 @@
 """A rollout of an SB3 PPO beside its gradient steps: rewards, and densities of its actions."""
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from gymnasium.spaces import Box
 from jaxtyping import Float
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from torch import Tensor
 
 from irl.core.finite import check_finite
-from irl.core.types import RewardFn, Transitions
+from irl.core.types import Metrics, RewardFn, Transitions
+from irl.learners.vec import Recorder
 from irl.policies import densities
 from irl.rewards.normalise import ReturnScale
+
+
+class Rollouts:
+    """What every PPO does between its gradient steps; whoever is one sets these four, and improves."""
+
+    model: PPO
+    venv: Recorder
+    _callback: BaseCallback
+    _scale: ReturnScale
+    _batch: Transitions | None = None
+
+    @property
+    def env_steps(self) -> int:
+        """Environment steps taken so far, over all environments."""
+        return self.model.num_timesteps
+
+    @property
+    def reward_scale(self) -> float:
+        """What the reward is divided by before PPO sees it."""
+        return self._scale.std
+
+    def start(self, reward: RewardFn, before_update: Callable[[Transitions], None] | None = None) -> None:
+        """Nothing: a rollout is rewarded after it is collected.
+
+        Raises:
+            ValueError: `before_update` is given; PPO has no replay memory to draw batches from.
+        """
+        if before_update is not None:
+            raise ValueError("PPO draws no batches from a replay memory; use SAC")
+
+    def take_finished(self) -> list[tuple[float, int]]:
+        """Return (the environment's own) and length of each episode that ended since the last call."""
+        return self.venv.take_finished()
+
+    def collect(self) -> Transitions:
+        """One rollout of the current policy, time-major; actions as the environment saw them."""
+        model = self.model
+        model.collect_rollouts(self.venv, self._callback, model.rollout_buffer, model.n_steps)
+        self._batch = self.venv.take().to(model.device)
+        return self._batch
+
+    def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:
+        """Log density of the batch's own actions, as the environment saw them, under the current policy.
+
+        `irl.policies.densities.clipped`; no normaliser moves and nothing is drawn.
+        """
+        return log_pi(self.model, batch)
+
+    def rewarded(self, reward: RewardFn) -> tuple[Transitions, Metrics]:
+        """Reward the last rollout in one batch; the rollout, and what its rewards were like.
+
+        Raises:
+            RuntimeError: nothing was collected since the last call.
+            NotFinite: a reward is NaN or infinite.
+        """
+        if self._batch is None:
+            raise RuntimeError("collect a rollout before improving on it")
+        batch, self._batch = self._batch, None
+        raw = give_rewards(self.model, self._scale, batch, reward)
+        return batch, {
+            "reward/mean": float(raw.mean()),
+            "reward/std": float(raw.std()),
+            "reward/scale": self._scale.std,
+        }
 
 
 @torch.no_grad()

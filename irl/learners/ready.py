@@ -21,7 +21,7 @@ from torch import Tensor
 from irl.core.finite import check_finite, named
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.envs.absorbing import absorb
-from irl.learners.ppo_rollout import give_rewards, log_pi
+from irl.learners.ppo_rollout import Rollouts
 from irl.learners.vec import Recorder
 from irl.policies import densities
 from irl.policies.policy import Policy
@@ -59,39 +59,13 @@ class _Ready:
         """Nothing: the environments are the model's."""
 
 
-class ReadyPPO(_Ready):
+class ReadyPPO(_Ready, Rollouts):
     """PPO as it was passed in."""
 
     def __init__(self, model: PPO, steps: int) -> None:
         super().__init__(model, steps)
-        self.model, self._batch = model, None
+        self.model = model
         self._scale = ReturnScale(model.n_envs, model.gamma)
-
-    @property
-    def env_steps(self) -> int:
-        """Environment steps taken so far, over all environments."""
-        return self.model.num_timesteps
-
-    @property
-    def reward_scale(self) -> float:
-        """What the reward is divided by before PPO sees it."""
-        return self._scale.std
-
-    def start(self, reward: RewardFn, before_update: Callable[[Transitions], None] | None = None) -> None:
-        """Nothing: a rollout is rewarded after it is collected."""
-        if before_update is not None:
-            raise ValueError("PPO draws no batches from a replay memory; use SAC")
-
-    def collect(self) -> Transitions:
-        """One rollout of the current policy, time-major; actions as the environment saw them."""
-        model = self.model
-        model.collect_rollouts(self.venv, self._callback, model.rollout_buffer, model.n_steps)
-        self._batch = self.venv.take().to(model.device)
-        return self._batch
-
-    def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:
-        """Log density of the batch's own actions (`irl.learners.ppo_rollout.log_pi`)."""
-        return log_pi(self.model, batch)
 
     def improve(self, reward: RewardFn) -> Metrics:
         """Reward the last rollout in one batch and do SB3's gradient steps on it.
@@ -100,14 +74,11 @@ class ReadyPPO(_Ready):
             RuntimeError: nothing was collected since the last call.
             NotFinite: the reward, or a weight after the steps, is NaN or infinite.
         """
-        if self._batch is None:
-            raise RuntimeError("collect a rollout before improving on it")
-        batch, self._batch = self._batch, None
-        raw = give_rewards(self.model, self._scale, batch, reward)
+        _, rewards = self.rewarded(reward)
         self.model._update_current_progress_remaining(self.env_steps, self.steps)
         self.model.train()
         check_finite(named("policy", self.model.policy.state_dict()))
-        return {"reward/mean": float(raw.mean()), "reward/std": float(raw.std())}
+        return rewards
 
 
 class ReadySAC(_Ready):
