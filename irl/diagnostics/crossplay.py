@@ -93,7 +93,7 @@ def spearman(a: Rows, b: Rows) -> Float[np.ndarray, "D"]:
 def kendall(a: Rows, b: Rows) -> Float[np.ndarray, "D"]:
     """Kendall's tau-b of each row.
 
-        tau_b = (pairs in one order - pairs in the other) / sqrt(pairs untied in a * pairs untied in b)
+    tau_b = (pairs in one order - pairs in the other) / sqrt(pairs untied in a * pairs untied in b)
     """
     first, second = np.triu_indices(a.shape[1], 1)
     x, y = np.sign(a[:, first] - a[:, second]), np.sign(b[:, first] - b[:, second])

@@ -31,6 +31,8 @@ LEAST_POINTS = 8
 MARGIN = 2.0
 """Of AICc, that the fit has to be better by."""
 WINDOW = 5
+MOVED = 0.1
+"""Of what proxy and gold span over the run, that each must span in a window for their ranks to mean anything."""
 SURE = 2.0
 """Standard errors that a change must exceed."""
 FORM = "d (alpha - beta log d), d = sqrt(step / last step)"
@@ -104,13 +106,17 @@ def overoptimisation(
 def decoupling(proxy: Points, gold: Points, error: Points) -> int | None:
     """The point where the first window with Spearman(proxy, gold) <= 0 begins.
 
-    A window in which gold moves by less than its errors is none: on a plateau ranks are chance.
+    A window in which either moves by less than a tenth of what it does over the run, or gold by less than
+    its errors, is none: on a plateau, and before anything is learned, ranks are chance.
     """
     for start in range(len(gold) - WINDOW + 1):
         inside = slice(start, start + WINDOW)
-        moved = np.ptp(gold[inside]) > 2 * SURE * math.sqrt(float(np.mean(error[inside] ** 2)))
+        noise = 2 * SURE * math.sqrt(float(np.mean(error[inside] ** 2)))
+        moved = all(np.ptp(of[inside]) > MOVED * np.ptp(of) for of in (proxy, gold))
+        if not moved or np.ptp(gold[inside]) <= noise:
+            continue
         # NaN where either stands still
-        if moved and statistics.spearman(proxy[inside], gold[inside]) <= 0:
+        if statistics.spearman(proxy[inside], gold[inside]) <= 0:
             return start
     return None
 
@@ -157,7 +163,9 @@ def aicc(residuals: Points, parameters: int) -> float:
 
 def _z(values: Points) -> float:
     """How many standard deviations above the mean the last one is."""
-    return float((values[-1] - values.mean()) / values.std()) if not statistics.is_constant(values) else math.nan
+    return (
+        float((values[-1] - values.mean()) / values.std()) if not statistics.is_constant(values) else math.nan
+    )
 
 
 def standard_errors(returns: Sequence[Float[np.ndarray, "_"]]) -> Points:

@@ -90,7 +90,11 @@ def seen(episodes: Sequence[Episode]) -> tuple[list[str], Float[np.ndarray, "N I
 
 
 def _left_over(
-    episodes: Sequence[Episode], learned: Sequence[np.ndarray], names: Sequence[str], gamma: float, ridge: float
+    episodes: Sequence[Episode],
+    learned: Sequence[np.ndarray],
+    names: Sequence[str],
+    gamma: float,
+    ridge: float,
 ) -> Float[np.ndarray, "N"]:
     """What the linear fit to the other folds leaves of each step."""
     mean, std = moments(episodes)
@@ -98,9 +102,7 @@ def _left_over(
     of_episodes = grams(designs, learned)
     whole, every = of_episodes.sum(0), range(designs[0].shape[1])
     potential = range(1 + len(names), designs[0].shape[1])
-    found = [
-        solve(whole - of_episodes[k::FOLDS].sum(0), every, potential, ridge) for k in range(FOLDS)
-    ]
+    found = [solve(whole - of_episodes[k::FOLDS].sum(0), every, potential, ridge) for k in range(FOLDS)]
     return np.concatenate(
         [r - x @ found[i % FOLDS] for i, (x, r) in enumerate(zip(designs, learned, strict=True))]
     )

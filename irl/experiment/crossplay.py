@@ -51,12 +51,7 @@ class Played:
 
     players: tuple[Player, ...]
     notes: tuple[str, ...] = ()
-    cost: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def checkpoints(self) -> tuple[Player, ...]:
-        """The run's own policies, in order."""
-        return tuple(player for player in self.players if player.step is not None)
+    cost: Mapping[str, int | float] = field(default_factory=dict)
 
 
 def play_policies(
@@ -85,16 +80,21 @@ def play_policies(
     return Played(tuple(players), tuple(notes), cost)
 
 
-def judge_cross_play(rewards: Mapping[int, Given], played: Played, seed: int) -> dict[str, Any]:
-    """What the contract of `cross_play` says, or the reason why there is none."""
-    returns = [returns_of(player.episodes, list(rewards.values())) for player in played.players]
+def judge_cross_play(
+    returns: Sequence[np.ndarray], snapshots: Sequence[int], played: Played, seed: int
+) -> dict[str, Any]:
+    """The matrix of returns and its agreement with the true ones, or the reason why there is none.
+
+    Args:
+        returns: of each player those of `returns_of`, a reward a snapshot.
+    """
     try:
         found = cross_play(returns, stream(seed, "cross-play"))
     except ValueError as error:
         return {"reason": str(error)}
     if np.ptp(found.true) == 0:
         return {"reason": f"the true return of each of these {len(found.true)} policies is {found.true[0]:g}"}
-    return as_json(found, list(rewards), played)
+    return as_json(found, snapshots, played)
 
 
 def returns_of(episodes: Sequence[Episode], rewards: Sequence[Given]) -> np.ndarray:
@@ -132,10 +132,7 @@ def as_json(found: CrossPlay, steps: Sequence[int], played: Played) -> dict[str,
 
 
 def _agreement(of: Agreement) -> dict[str, Any]:
-    return {
-        name: {k: finite(v) for k, v in estimate.items()}
-        for name, estimate in asdict(of).items()
-    }
+    return {name: {k: finite(v) for k, v in one.items()} for name, one in asdict(of).items()}
 
 
 def _second_tasks(env_id: str, root: Path | None) -> tuple[list[tuple[str, ActFn]], list[str]]:

@@ -56,10 +56,13 @@ def test_what_moves_by_less_than_its_errors_stands_still() -> None:
     proxy, error = np.arange(8.0), np.full(8, 5.0)
     steps = np.arange(8)
     assert overoptimisation(steps, proxy, gold).drop == pytest.approx(3.5 / 100.5)
-    assert overoptimisation(steps, proxy, gold).decoupling is not None
+    assert decoupling(proxy[2:], gold[2:], error[2:] * 0) is not None
     found = overoptimisation(steps, proxy, gold, error)
     assert found.drop == 0.0
     assert found.decoupling is None
+    # a long climb before: the plateau is a small part of it
+    climbed = np.concatenate([np.linspace(-3000.0, -50.0, 6), gold])
+    assert decoupling(np.arange(14.0), climbed, np.zeros(14)) is None
     never = overoptimisation(steps, proxy, -gold, error)
     assert math.isnan(never.drop)
 
