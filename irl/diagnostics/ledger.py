@@ -69,7 +69,7 @@ LEDGERS: Mapping[str, Ledger] = MappingProxyType(
                 "the advantage of the expert's soft-optimal policy: at the optimum f is log pi of the expert",
             ),
             cannot=(
-                "reward apart from value: an advantage holds the dynamics, and is wrong where those are others",
+                "reward apart from value: an advantage holds the dynamics, and misleads under others",
                 _SHAPING,
                 _DATA,
             ),

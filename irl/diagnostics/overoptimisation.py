@@ -32,7 +32,7 @@ MARGIN = 2.0
 """Of AICc, that the fit has to be better by."""
 WINDOW = 5
 MOVED = 0.1
-"""Of what proxy and gold span over the run, that each must span in a window for their ranks to mean anything."""
+"""Of what proxy and gold span over the run, that each must span in a window for ranks to mean anything."""
 SURE = 2.0
 """Standard errors that a change must exceed."""
 FORM = "d (alpha - beta log d), d = sqrt(step / last step)"
@@ -154,7 +154,7 @@ def monotone(d: Points, y: Points) -> tuple[float, float, float]:
 
 
 def aicc(residuals: Points, parameters: int) -> float:
-    """n log(RSS / n) + 2 k + 2 k (k + 1) / (n - k - 1), with k the parameters and the variance."""
+    """N log(RSS / N) + 2 k + 2 k (k + 1) / (N - k - 1), with k the parameters and the variance."""
     n, k = len(residuals), parameters + 1
     # an exact fit has no logarithm
     spread = max(float(np.mean(residuals**2)), np.finfo(float).tiny)

@@ -1,6 +1,6 @@
 """What else a learned reward pays for: a nonlinear model of what the terms and a potential leave over.
 
-    e           =  r - c - sum_k w_k T_k - shaping                  each step by a fit to other episodes (terms)
+    e           =  r - c - sum_k w_k T_k - shaping       each step by a fit to other episodes (terms)
     e           ~  ridge on [1, z, z^2, cos(W z + b)],  z of (s, a, s' - s)        (features)
     R^2         =  1 - |e - fit|^2 / |e - mean|^2                   on episodes that the model has not seen
     importance  =  R^2 - R^2 with one column of those episodes in another order

@@ -46,8 +46,8 @@ RULES: tuple[Rule, ...] = (
         0.2,
         True,
         "distance (VAL) of the last reward to that halfway through the run is above the threshold",
-        "Half the run ago the reward asked for something else; a policy trained on the last one is trained on "
-        "another reward than this policy was.",
+        "Half the run ago the reward asked for something else; a policy trained on the last one alone is "
+        "trained on another reward than this policy was.",
         "What the reward asks for has changed little since halfway through the run.",
     ),
     Rule(
@@ -98,8 +98,8 @@ RULES: tuple[Rule, ...] = (
         "hacked",
         0.2,
         True,
-        "share of its gain in true return that the policy lost again, where the learned return rose meanwhile, "
-        "is above the threshold",
+        "share of its gain in true return that the policy lost again, where the learned return rose "
+        "meanwhile, is above the threshold",
         "The policy gets more of the learned reward and less of the true one: the reward is being exploited.",
         "The true return did not fall while the learned one rose.",
     ),

@@ -1,6 +1,6 @@
 """What evaluation.json says of trusting a reward: by policies, over the run, what else, what at all.
 
-`cross_play`, `proxy_gold`, `residual`, `ledger`, `chosen` and `verdicts`; each says why where it is not known.
+`cross_play`, `proxy_gold`, `residual`, `ledger`, `chosen`, `verdicts`; each says why where it is not known.
 """
 
 from collections.abc import Mapping, Sequence
@@ -151,7 +151,7 @@ def _chosen(
 
 
 def _losses(seen: Seen) -> list[float]:
-    """Of each snapshot the share of pairs in which a step of one of the run's policies outranks the expert's."""
+    """Of each snapshot the share of pairs in which a policy's step outranks the expert's."""
     if seen.held_out is None:
         return [np.nan] * len(seen.rewards)
     policies = from_episodes([episode for episodes in seen.fresh.values() for episode in episodes])
