@@ -8,21 +8,19 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import torch
 
 from irl.algorithms.probe_set import ProbeSet
-from irl.core import statistics
 from irl.core.rng import stream
-from irl.core.types import Episode, Transitions, from_episodes
+from irl.core.types import Episode, Transitions
 from irl.diagnostics import ledger
-from irl.diagnostics.choosing import RULE, Criteria, beside, choose, disagreement
-from irl.diagnostics.overoptimisation import FORM, overoptimisation, standard_errors
+from irl.diagnostics.overoptimisation import standard_errors
 from irl.diagnostics.residual import residual
 from irl.diagnostics.stack import read, stack
 from irl.diagnostics.verdicts import NAMES, verdicts
 from irl.envs.tasks import task_of
+from irl.experiment.chosen import chosen_of, losses
 from irl.experiment.crossplay import Played, judge_cross_play, returns_of
-from irl.experiment.judge import finite
+from irl.experiment.overoptimised import Fell, over_run
 from irl.rewards.learned import LearnedReward
 from irl.rewards.shaped import ENTROPIC, ShapedNet
 
@@ -57,7 +55,7 @@ def judge_trust(seen: Seen, drift: Mapping[str, Any], seed: int) -> dict[str, An
         "proxy_gold": proxy,
         "residual": _residual(rewards[-1], seen.base, seed),
         "ledger": ledger_of(rewards[-1]),
-        "chosen": _chosen(seen, drift, returns, cross),
+        "chosen": chosen_of(losses(seen.rewards, seen.held_out, seen.fresh), returns, drift, cross),
         "verdicts": [asdict(v) for v in verdicts(*_numbers(steps, drift, seen.base, fell))],
     }
 
@@ -84,35 +82,16 @@ def ledger_of(reward: LearnedReward) -> dict[str, Any]:
     return {"kind": kind, "determines": list(row.determines), "cannot": cannot, "source": row.source}
 
 
-def _proxy_gold(
-    played: Played, returns: Sequence[np.ndarray]
-) -> tuple[dict[str, Any], tuple[float, float] | str]:
-    """Both returns of the run's own policies; and what was lost while the proxy fell, and while it rose."""
+def _proxy_gold(played: Played, returns: Sequence[np.ndarray]) -> tuple[dict[str, Any], Fell]:
+    """Both returns of the run's own policies, and what of the gain was lost."""
     own = [(p.step, r) for p, r in zip(played.players, returns, strict=True) if p.step is not None]
-    steps = np.array([step for step, _ in own])
-    gold = np.array([rows[:, 0].mean() for _, rows in own])
-    proxy = np.array([rows[:, -1].mean() for _, rows in own])
-    now = [float(rows[:, 1 + i].mean()) for i, (_, rows) in enumerate(own)]
-    error = standard_errors([rows[:, 0] for _, rows in own])
-    try:
-        found = overoptimisation(steps, proxy, gold, error)
-    except ValueError as failed:
-        return {"reason": str(failed)}, str(failed)
-    columns = zip(steps.tolist(), proxy.tolist(), gold.tolist(), error.tolist(), now, strict=True)
-    names = ("step", "proxy", "gold", "gold_error", "proxy_then")
-    content = {
-        "points": [dict(zip(names, row, strict=True)) for row in columns],
-        "peak_step": int(steps[found.peak]),
-        "drop": finite(found.drop),
-        "gap": finite(found.gap),
-        "proxy_rose": found.proxy_rose,
-        "decoupling_step": None if found.decoupling is None else int(steps[found.decoupling]),
-        "fit": None if found.fit is None else {**asdict(found.fit), "peak": found.fit.peak, "form": FORM},
-        "fit_reason": found.fit_reason,
-    }
-    if not np.isfinite(found.drop):
-        return content, "the true return never rose beyond its errors"
-    return content, (0.0, found.drop) if found.proxy_rose else (found.drop, 0.0)
+    return over_run(
+        [step for step, _ in own],
+        proxy=[float(rows[:, -1].mean()) for _, rows in own],
+        gold=[float(rows[:, 0].mean()) for _, rows in own],
+        error=standard_errors([rows[:, 0] for _, rows in own]),
+        then=[float(rows[:, 1 + i].mean()) for i, (_, rows) in enumerate(own)],
+    )
 
 
 def _residual(reward: LearnedReward, base: ProbeSet, seed: int) -> dict[str, Any]:
@@ -128,63 +107,8 @@ def _residual(reward: LearnedReward, base: ProbeSet, seed: int) -> dict[str, Any
     return {"r2": found.r2, "share": found.share, "features": features}
 
 
-def _chosen(
-    seen: Seen, drift: Mapping[str, Any], returns: Sequence[np.ndarray], cross: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Which snapshot would be kept without the truth, and where it is known how good a choice that is."""
-    steps = list(seen.rewards)
-    learned = np.stack([rows[:, 1:].mean(0) for rows in returns], axis=1)
-    loss = _losses(seen)
-    speed = np.array([np.nan if v is None else v for v in drift["speed"]])
-    columns = zip(loss, beside(speed), disagreement(learned), strict=True)
-    criteria = {s: Criteria(*map(float, row)) for s, row in zip(steps, columns, strict=True)}
-    try:
-        choice = choose(criteria)
-    except ValueError as failed:
-        return {"reason": str(failed)}
-    rows = [
-        {"step": s, **{k: finite(v) for k, v in asdict(criteria[s]).items()}, "rank": finite(choice.ranks[s])}
-        for s in steps
-    ]
-    compared = _compared(choice.step, steps, drift, cross)
-    return {"step": choice.step, "rule": RULE, "criteria": rows, "compared": compared}
-
-
-def _losses(seen: Seen) -> list[float]:
-    """Of each snapshot the share of pairs in which a policy's step outranks the expert's."""
-    if seen.held_out is None:
-        return [np.nan] * len(seen.rewards)
-    policies = from_episodes([episode for episodes in seen.fresh.values() for episode in episodes])
-    found = []
-    for reward in seen.rewards.values():
-        with torch.no_grad():
-            expert, policy = (reward.logits(b).double().numpy() for b in (seen.held_out, policies))
-        found.append(1.0 - statistics.auroc(expert, policy))
-    return found
-
-
-def _compared(
-    step: int, steps: Sequence[int], drift: Mapping[str, Any], cross: Mapping[str, Any]
-) -> dict[str, Any] | None:
-    """The chosen snapshot among those after step 0, by each measure of the truth; 1 is the best place."""
-    measures = {"distance": [of["value"] for of in drift["to_truth"]]}
-    if "agreement" in cross:
-        measures["kendall"] = [of["kendall"]["value"] for of in cross["agreement"]]
-    found: dict[str, Any] = {}
-    for name, values in measures.items():
-        there = {s: v for s, v in zip(steps, values, strict=True) if s > 0 and v is not None}
-        if step not in there:
-            continue
-        sign = 1 if name == "distance" else -1
-        best = min(there, key=lambda s: sign * there[s])
-        place = 1 + sum(sign * v < sign * there[step] for v in there.values())
-        found[name] = {"chosen": there[step], "last": there.get(steps[-1]), "best": there[best]}
-        found[name] |= {"best_step": best, "place": place, "of": len(there)}
-    return found or None
-
-
 def _numbers(
-    steps: Sequence[int], drift: Mapping[str, Any], base: ProbeSet, fell: tuple[float, float] | str
+    steps: Sequence[int], drift: Mapping[str, Any], base: ProbeSet, fell: Fell
 ) -> tuple[dict[str, float | None], dict[str, str]]:
     """The number behind each verdict by its name, and why one is not there."""
     last, before = steps[-1], list(zip(steps, drift["to_final"], strict=True))[:-1]
