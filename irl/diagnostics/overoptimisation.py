@@ -63,6 +63,8 @@ class Overoptimisation:
     """Which point has the highest gold return."""
     drop: float
     """Share of what was gained that was lost again; 0 for what is within errors; NaN if nothing was."""
+    lost: float
+    """The same of what lies above a floor: a first policy that happens to be good makes any gain small."""
     gap: float
     proxy_rose: bool
     """Whether the proxy at the end is above that at the peak of gold."""
@@ -74,13 +76,18 @@ class Overoptimisation:
 
 
 def overoptimisation(
-    steps: Int[np.ndarray, "N"], proxy: Points, gold: Points, error: Points | None = None
+    steps: Int[np.ndarray, "N"],
+    proxy: Points,
+    gold: Points,
+    error: Points | None = None,
+    floor: float | None = None,
 ) -> Overoptimisation:
     """Peak, drop, gap, decoupling and fit of a curve.
 
     Args:
         steps: rising; the first is what the others are held against.
         error: standard error of each gold return; none unless given.
+        floor: gold return of random actions; that of the first point unless given.
     Raises:
         ValueError: there are fewer than two points, or a return is not finite.
     """
@@ -88,19 +95,25 @@ def overoptimisation(
         raise ValueError(f"proxy and gold of {len(steps)} points; two or more finite ones are needed")
     error = np.zeros(len(gold)) if error is None else error
     peak = int(np.argmax(gold))
-    rise, fall = float(gold[peak] - gold[0]), float(gold[peak] - gold[-1])
-    noise = SURE * math.hypot(error[peak], error[-1])
-    grown = rise > SURE * math.hypot(error[peak], error[0])
     fit, reason = fitted(steps, gold)
     return Overoptimisation(
         peak=peak,
-        drop=(fall / rise if fall > noise else 0.0) if grown else math.nan,
+        drop=_lost(gold, error, peak, float(gold[0])),
+        lost=_lost(gold, error, peak, float(gold[0]) if floor is None else floor),
         gap=_z(proxy) - _z(gold),
         proxy_rose=bool(proxy[-1] > proxy[peak]),
         decoupling=decoupling(proxy, gold, error),
         fit=fit,
         fit_reason=reason,
     )
+
+
+def _lost(gold: Points, error: Points, peak: int, floor: float) -> float:
+    """Share of the peak above `floor` that the end lacks."""
+    rise, fall = float(gold[peak]) - floor, float(gold[peak] - gold[-1])
+    if rise <= SURE * math.hypot(error[peak], error[0]):
+        return math.nan
+    return fall / rise if fall > SURE * math.hypot(error[peak], error[-1]) else 0.0
 
 
 def decoupling(proxy: Points, gold: Points, error: Points) -> int | None:

@@ -1,7 +1,8 @@
 """What is the matter with a reward: one table of rules, each a number against a threshold.
 
 A rule says what it takes, when it fires and what that means; a number that is not known is not judged, and
-says why. Thresholds are ours, set where healthy runs of Hopper and HalfCheetah stay silent.
+says why. Thresholds are ours: round numbers beyond what short runs of GAIL, AIRL and DAC on Hopper have, not
+calibrated on many.
 """
 
 import math
@@ -70,8 +71,8 @@ RULES: tuple[Rule, ...] = (
         "collapsed",
         0.5,
         True,
-        "share of its gain in true return that the policy lost again, where the learned return fell with it, "
-        "is above the threshold",
+        "share of its true return above random actions that the policy lost again, where the learned return "
+        "fell with it, is above the threshold",
         "The policy has lost most of what it had learned, and the reward saw it: the training fell over, and "
         "an earlier snapshot is better.",
         "The policy kept what it had learned.",
@@ -98,8 +99,8 @@ RULES: tuple[Rule, ...] = (
         "hacked",
         0.2,
         True,
-        "share of its gain in true return that the policy lost again, where the learned return rose "
-        "meanwhile, is above the threshold",
+        "share of its true return above random actions that the policy lost again, where the learned return "
+        "rose meanwhile, is above the threshold",
         "The policy gets more of the learned reward and less of the true one: the reward is being exploited.",
         "The true return did not fall while the learned one rose.",
     ),

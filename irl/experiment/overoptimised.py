@@ -21,16 +21,18 @@ def over_run(
     gold: Sequence[float],
     error: Float[np.ndarray, "N"] | None = None,
     then: Sequence[float] | None = None,
+    floor: float | None = None,
 ) -> tuple[dict[str, Any], Fell]:
     """What the two returns of a run's policies say, and what was lost again.
 
     Args:
         error: standard error of each true return, where it is known.
+        floor: true return of random actions, which a gain is counted from; the first policy's unless given.
         then: return under the reward of the policy's own moment; `proxy` is all by one reward.
     """
     at, learned, true = np.array(steps, dtype=np.int64), np.array(proxy, float), np.array(gold, float)
     try:
-        found = overoptimisation(at, learned, true, error)
+        found = overoptimisation(at, learned, true, error, floor)
     except ValueError as failed:
         return {"reason": str(failed)}, str(failed)
     columns = {"step": steps, "proxy": proxy, "gold": gold}
@@ -40,12 +42,13 @@ def over_run(
         "points": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
         "peak_step": steps[found.peak],
         "drop": finite(found.drop),
+        "lost": finite(found.lost),
         "gap": finite(found.gap),
         "proxy_rose": found.proxy_rose,
         "decoupling_step": None if found.decoupling is None else steps[found.decoupling],
         "fit": None if found.fit is None else {**asdict(found.fit), "peak": found.fit.peak, "form": FORM},
         "fit_reason": found.fit_reason,
     }
-    if not np.isfinite(found.drop):
+    if not np.isfinite(found.lost):
         return content, "the true return never rose beyond its errors"
-    return content, (0.0, found.drop) if found.proxy_rose else (found.drop, 0.0)
+    return content, (0.0, found.lost) if found.proxy_rose else (found.lost, 0.0)

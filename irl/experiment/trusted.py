@@ -84,6 +84,7 @@ def ledger_of(reward: LearnedReward) -> dict[str, Any]:
 
 def _proxy_gold(played: Played, returns: Sequence[np.ndarray]) -> tuple[dict[str, Any], Fell]:
     """Both returns of the run's own policies, and what of the gain was lost."""
+    random = [r[:, 0].mean() for p, r in zip(played.players, returns, strict=True) if p.kind == "random"]
     own = [(p.step, r) for p, r in zip(played.players, returns, strict=True) if p.step is not None]
     return over_run(
         [step for step, _ in own],
@@ -91,6 +92,7 @@ def _proxy_gold(played: Played, returns: Sequence[np.ndarray]) -> tuple[dict[str
         gold=[float(rows[:, 0].mean()) for _, rows in own],
         error=standard_errors([rows[:, 0] for _, rows in own]),
         then=[float(rows[:, 1 + i].mean()) for i, (_, rows) in enumerate(own)],
+        floor=float(random[0]) if random and np.isfinite(random[0]) else None,
     )
 
 

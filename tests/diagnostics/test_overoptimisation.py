@@ -44,6 +44,17 @@ def test_a_monotone_curve_is_not_fitted(curve: np.ndarray, seed: int) -> None:
     assert reason is not None
 
 
+def test_a_peak_of_noise_is_not_fitted() -> None:
+    # rises, then stands: by chance the best fit has its peak inside, as every third such curve's does
+    rng, refused = np.random.default_rng(0), 0
+    for _ in range(60):
+        gold = 100.0 * (1.0 - np.exp(-D / 0.2)) + rng.normal(0.0, 3.0, len(D))
+        fit, reason = fitted(STEPS, gold)
+        assert fit is None or fit.gain > 2.0
+        refused += "AICc" in (reason or "")
+    assert refused > 0
+
+
 def test_nor_is_a_short_one_or_one_that_stands_still() -> None:
     fit, reason = fitted(STEPS[:8], gao()[:8])
     assert fit is None
@@ -63,6 +74,9 @@ def test_what_moves_by_less_than_its_errors_stands_still() -> None:
     # a long climb before: the plateau is a small part of it
     climbed = np.concatenate([np.linspace(-3000.0, -50.0, 6), gold])
     assert decoupling(np.arange(14.0), climbed, np.zeros(14)) is None
+    lucky = overoptimisation(steps, proxy, np.array([95.0, *gold[1:-1], 80.0]), error * 0, floor=0.0)
+    assert lucky.drop == pytest.approx(20.5 / 5.5)
+    assert lucky.lost == pytest.approx(20.5 / 100.5)
     never = overoptimisation(steps, proxy, -gold, error)
     assert math.isnan(never.drop)
 
