@@ -22,6 +22,7 @@ from irl.envs.make import make
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Imitation
 from irl.experiment.draw import drawn_again
+from irl.experiment.filmed import record
 from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.probed import Asked, Named, probed
 from irl.experiment.progress import each_episode, progress
@@ -56,9 +57,12 @@ class Evaluate:
     """Steps of each stratum of the probe that is played; numbers of other sizes do not compare."""
     also: tuple[Named, ...] = ()
     """Distances to give beside VAL."""
+    frames: int = 60
+    """Pictures of an episode for the report, at most; 0 draws none."""
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "episodes", "probe_steps")
+        check_at_least(self, 0, "frames")
         check_seed(self.seed)
 
 
@@ -116,6 +120,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "distances": distances,
         "terms": terms,
         "drift": {**drift, **more},
+        "episodes": record(folder.path, config.env_id, episodes, rewards[steps], command.frames),
     }
 
 
