@@ -7,7 +7,7 @@ METHODS = {
     "gail": ("GAIL", "Ho & Ermon (2016), Generative Adversarial Imitation Learning, arXiv:1606.03476"),
     "airl": (
         "AIRL",
-        "Fu, Luo & Levine (2018), Learning Robust Rewards with Adversarial Inverse Reinforcement Learning, arXiv:1710.11248",
+        "Fu, Luo & Levine (2018), Adversarial Inverse Reinforcement Learning, arXiv:1710.11248",
     ),
     "dac": ("DAC", "Kostrikov et al. (2019), Discriminator-Actor-Critic, arXiv:1809.02925"),
 }

@@ -5,7 +5,7 @@ from html import escape
 from typing import Any
 
 from irl.report.folder import RunFiles, lookup, number, texts
-from irl.report.readings import headline
+from irl.report.summary import summary
 
 CHIEF_PACKAGES = ("irl", "torch", "stable-baselines3", "gymnasium", "mujoco", "numpy")
 
@@ -25,10 +25,11 @@ def header(run: RunFiles) -> str:
         "Machine": _joined(environment.get("machine"), _device(environment)),
         "Versions": _versions(environment),
     }
+    sentences = "".join(f"<li>{escape(sentence)}</li>" for sentence in summary(run))
     return (
         f"<header><h1>{escape(run.name)}</h1>"
         f'<p class="kind">{escape(str(kind))} on {escape(str(task))}, {steps:,.0f} environment steps</p>'
-        f'<p class="lead">{escape(headline(evaluation))}</p>{_facts(facts)}</header>'
+        f'<ul class="lead">{sentences}</ul>{_facts(facts)}</header>'
     )
 
 

@@ -24,8 +24,9 @@ HOW: dict[str, tuple[str, str]] = {
     ),
     "discriminator": (
         "Discriminator health",
-        "AUROC: how often an expert step has the higher logit than a fresh step of the snapshot's own policy; "
-        "0.5 is blind. Held-out demonstrations were not trained on. Accuracy is of the training batches, "
+        "AUROC: how often an expert step has the higher logit than a fresh step of the snapshot's own "
+        "policy; 0.5 is blind. Held-out demonstrations were not trained on. Accuracy is of the "
+        "training batches, "
         "before each update. Source code: irl/diagnostics/health.py.",
     ),
     "fan": (
@@ -73,8 +74,8 @@ HOW: dict[str, tuple[str, str]] = {
     ),
     "crossplay": (
         "Cross-play",
-        "Every policy's mean episode return under every snapshot's learned reward, standardised along each "
-        "row because the scale of a learned reward means nothing. Kendall's τ and Spearman's ρ compare the "
+        "Every policy's mean episode return under every snapshot's learned reward, as ranks within each row "
+        "because the scale of a learned reward means nothing. Kendall's τ and Spearman's ρ compare the "
         "order of a row with the order by true return; regret is what is lost by picking the row's "
         "favourite, of the range. Intervals over episodes. Source code: irl/experiment/crossplay.py.",
     ),

@@ -120,7 +120,8 @@ def _sections(run: RunFiles, page: Page, prefix: str = "", pictures: bool = True
         for panel in shown
     )
     sections = "".join(page.section(panel, prefix) for panel in shown)
-    return f'<nav aria-label="sections">{links}<a href="#how">How</a></nav>{sections}{notes(run, prefix)}{settings(run)}'
+    nav = f'<nav aria-label="sections">{links}<a href="#how">How</a></nav>'
+    return nav + sections + notes(run, prefix) + settings(run)
 
 
 _MISSING = ' class="missing" title="not shown: see there"'
@@ -161,7 +162,8 @@ def _several(runs: Sequence[RunFiles]) -> str:
         body = header(run) + _sections(run, page, f"run{i}-", pictures=False)
         left -= len(body.encode())
         if left < 0:
-            body = f'<p class="absent">Not shown: the page would be too large. To see it: irl report {escape(run.name)}</p>'
+            reason = f"Not shown: the page would be too large. To have it: irl report {run.name}"
+            body = f'<p class="absent">{escape(reason)}</p>'
         names.append(run.name)
         bodies.append(f"<div>{body}</div>")
     return "".join(parts) + controlled("runs", names, bodies, "tabs", "runs")

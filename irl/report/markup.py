@@ -48,23 +48,13 @@ class Page:
     def _views(self, panel: Panel, prefix: str) -> str:
         name = f"{prefix}{panel.anchor}"
         shown = [
-            "".join(self._figure(figure, f"{name}-{i}-{j}") for j, figure in enumerate(view.figures))
+            "".join(drawing(figure, f"{name}-{i}-{j}") for j, figure in enumerate(view.figures))
             for i, view in enumerate(panel.views)
         ]
         if len(shown) < 2:
             return "".join(f'<div class="view">{figures}</div>' for figures in shown)
         labels = [view.label for view in panel.views]
         return controlled(name, labels, shown, panel.control, panel.control_label, panel.chosen)
-
-    def _figure(self, figure: go.Figure, name: str) -> str:
-        number = next(self._ids)
-        height = figure.layout.height or 380  # pyright: ignore[reportAttributeAccessIssue]
-        return (
-            f'<figure class="plot" data-file="{name}"><div id="figure-{number}" class="drawing" '
-            f'style="height:{height}px"></div>'
-            f'<script type="application/json">{embedded(figure.to_plotly_json())}</script>'
-            f"{_take(name)}</figure>"
-        )
 
     def table(self, table: Table, name: str) -> str:
         """A table that can be taken as CSV or JSON, and scrolls sideways where it must."""
@@ -75,8 +65,8 @@ class Page:
         )
         caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
         return (
-            f'<div class="tabled" data-file="{name}-table-{next(self._ids)}"><div class="wide" tabindex="0" role="region" '
-            f'aria-label="{escape(table.caption or "table")}"><table>{caption}<thead><tr>{head}</tr></thead>'
+            f'<div class="tabled" data-file="{name}-table-{next(self._ids)}"><div class="wide" tabindex="0" '
+            f'role="region" aria-label="{escape(table.caption or "table")}"><table>{caption}<thead><tr>{head}</tr></thead>'
             f"<tbody>{rows}</tbody></table></div>{_take(name)}</div>"
         )
 
@@ -86,7 +76,8 @@ def controlled(
 ) -> str:
     """Views of which one is shown: tabs, or a slider over them."""
     bodies = "".join(
-        f'<div class="view" id="{name}-view-{i}" {_role(control, name, i)}{"" if i == chosen else " hidden"}>{body}</div>'
+        f'<div class="view" id="{name}-view-{i}" {_role(control, name, i)}'
+        f"{'' if i == chosen else ' hidden'}>{body}</div>"
         for i, body in enumerate(views)
     )
     if control == "slider":
@@ -111,9 +102,20 @@ def _role(control: str, name: str, i: int) -> str:
     return "" if control == "slider" else f'role="tabpanel" aria-labelledby="{name}-tab-{i}"'
 
 
+def drawing(figure: go.Figure, name: str, title: str = "") -> str:
+    """A figure that a script draws when it comes into sight, with its numbers beside it."""
+    height = figure.layout.height or 380  # pyright: ignore[reportAttributeAccessIssue]
+    caption = f"<figcaption>{escape(title)}</figcaption>" if title else ""
+    return (
+        f'<figure class="plot" data-file="{name}">{caption}<div class="drawing" '
+        f'style="height:{height}px"></div>'
+        f'<script type="application/json">{embedded(figure.to_plotly_json())}</script>{_take(name)}</figure>'
+    )
+
+
 def _take(name: str) -> str:
     buttons = "".join(
-        f'<button type="button" data-take="{kind}" aria-label="{name} as {kind.upper()}">{kind.upper()}</button>'
+        f'<button type="button" data-take="{kind}" aria-label="{name} as {kind}">{kind.upper()}</button>'
         for kind in ("csv", "json")
     )
     return f'<div class="take">take the numbers: {buttons}</div>'

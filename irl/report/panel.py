@@ -1,4 +1,4 @@
-"""What a section of the page is made of: views of figures, tables, and the sentence on what to see in them."""
+"""What a section of the page is made of: views of figures, tables, and what to see in them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -82,4 +82,4 @@ def unmeasured(run: RunFiles, anchor: str, title: str, path: str) -> Panel:
 
 def plain(text: object) -> str:
     """A string of a file as a figure shows it: plotly follows some markup in its labels."""
-    return str(text).replace("<", "‹").replace(">", "›").replace("&", "+")
+    return str(text).translate(str.maketrans("<>&", "()+"))

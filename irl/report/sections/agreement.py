@@ -1,4 +1,4 @@
-"""The learned reward against the hand-written one: a honeycomb, a line for each kind of play, and what differs."""
+"""The learned reward against the hand-written one: a honeycomb, lines, and where the two differ most."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,9 +23,9 @@ def agreement(run: RunFiles) -> Panel:
     names = {"segment": f"segments of {n} steps, shaping taken off", "step": "single steps, as they are"}
     views = tuple(View(names[unit], (honeycomb(rows, unit),)) for unit, rows in whole.items())
     text = (
-        "One hexagon holds the probe steps that fall into it; a line is one kind of play. Where all lines rise "
-        "with the same slope the learned reward wants what the hand-written one wants; a flat or falling line "
-        "is a kind of play that it misjudges. Single steps scatter by shaping, which changes no policy."
+        "A hexagon holds the probe steps that fall into it; a line is one kind of play. Where all lines rise "
+        "alike the learned reward wants what the hand-written one wants; a flat or falling line is a kind of "
+        "play that it misjudges. Single steps scatter by shaping, which changes no policy."
     )
     tables = tuple(table for table in (_slopes(whole), _residuals(run)) if table is not None)
     return Panel(anchor, title, text, "against", views, tables=tables, notes=_notes(run))
@@ -135,7 +135,7 @@ def _residuals(run: RunFiles) -> Table | None:
     return Table(
         head,
         shown,
-        "Largest disagreements: the steps furthest from one line through all, two an episode at most",
+        "Largest disagreements: steps furthest from one line through all, two an episode at most",
     )
 
 
@@ -162,7 +162,7 @@ def _older(run: RunFiles, anchor: str, title: str) -> Panel:
         known = finite(lookup(run.evaluation, "reward.pearson")) is not None
         return unmeasured(run, anchor, title, "reward.scatter" if known else "reward.pearson")
     text = (
-        "A rising cloud means that the learned reward ranks steps as the hand-written one does; a reward that "
+        "A rising cloud means that the learned reward ranks steps as the hand-written one does; one that "
         "differs by shaping alone can scatter here and still want the same policy."
     )
     drawn = plots.learned_against_hand_written(learned, hand_written, stratum)

@@ -1,4 +1,4 @@
-"""Several runs on one axis: methods as colours, seeds as thin lines, their interquartile mean as a thick one."""
+"""Several runs on one axis: methods as colours, seeds as thin lines, their interquartile mean thick."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -31,9 +31,9 @@ def compare(runs: Sequence[RunFiles]) -> Panel:
         if any(points for _, (_, points) in lines):
             views.append(View(label, (overlay(lines, unit),)))
     text = (
-        "A colour is a method on a task, a thin line a run of one seed, a thick line the interquartile mean of a method's "
-        "seeds. Runs agree where the thin lines of a colour lie together; a method is better than another "
-        "only where its whole bundle is."
+        "A colour is a method on a task, a thin line a run of one seed, a thick line the interquartile mean "
+        "of a method's seeds. Runs agree where the thin lines of a colour lie together; a method is better "
+        "than another only where its whole bundle is."
     )
     tables = (_table(runs), _by_method(runs))
     if not views and not any(run.evaluation for run in runs):

@@ -1,7 +1,7 @@
 """Every policy under every snapshot's reward: does the reward rank policies as the truth does?"""
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
-from statistics import fmean, pstdev
 from typing import Any
 
 import plotly.graph_objects as go
@@ -25,9 +25,9 @@ def crossplay(run: RunFiles) -> Panel:
     if not _whole(found):
         return unmeasured(run, anchor, title, "cross_play.learned")
     text = (
-        "A row is a snapshot of the reward, a column a policy, from the worst to the best by true return; a "
-        "cell is what that reward thinks of that policy beside the others. A reward that can be trusted "
-        "turns from blue to orange once, from left to right; orange on the left is a policy that it overrates."
+        "A row is a snapshot of the reward, a column a policy, from the worst to the best by true return; "
+        "blue is the policy that this reward likes least, orange the one it likes best. A reward that ranks "
+        "as the truth does goes from blue to orange, left to right; orange on the left is overrated."
     )
     views = (View("matrix", (matrix(found),)), View("agreement over training", (agreement(found),)))
     return Panel(
@@ -43,7 +43,7 @@ def crossplay(run: RunFiles) -> Panel:
 
 
 def matrix(found: Mapping[str, Any]) -> go.Figure:
-    """Learned returns, standardised along each row, columns by true return."""
+    """Ranks of the learned returns within each row, columns by true return."""
     order = sorted(range(len(found["policies"])), key=lambda i: _true(found, i))
     rows = [[row[i] for i in order] for row in found["learned"]]
     names = [f"{plain(found['policies'][i].get('name'))} ({amount(_true(found, i))})" for i in order]
@@ -51,16 +51,17 @@ def matrix(found: Mapping[str, Any]) -> go.Figure:
     up = list(range(len(rows)))
     drawn = go.Figure(
         go.Heatmap(
-            z=[standardised(row) for row in rows],
+            z=[ranked(row) for row in rows],
             x=places,
             y=up,
             customdata=rows,
-            zmid=0,
+            zmin=0,
+            zmax=1,
             colorscale=SIGNED,
             xgap=1,
             ygap=1,
-            hovertemplate="%{x}: learned return %{customdata:.4g}, %{z:+.2f} std<extra></extra>",
-            colorbar={"title": {"text": "std from the row's mean", "side": "right"}, "thickness": 10},
+            hovertemplate="%{x}: learned return %{customdata:.4g}, rank %{z:.2f}<extra></extra>",
+            colorbar={"title": {"text": "rank in its row", "side": "right"}, "thickness": 10},
         )
     )
     framed(drawn, "policy (true return)", "reward of snapshot", height=max(330, 22 * len(rows) + 250))
@@ -100,11 +101,15 @@ def agreement(found: Mapping[str, Any]) -> go.Figure:
     return drawn.update_layout(hovermode="x")
 
 
-def standardised(row: Sequence[float | None]) -> list[float | None]:
-    """A row less its mean, over its deviation; None where a number is not known or all are one."""
-    known = [value for value in row if value is not None]
-    spread = pstdev(known) if len(known) > 1 else 0.0
-    return [None if value is None or not spread else (value - fmean(known)) / spread for value in row]
+def ranked(row: Sequence[float | None]) -> list[float | None]:
+    """The place of each number in its row, 0 the least and 1 the most; equal ones share theirs."""
+    known = sorted(value for value in row if value is not None)
+    most = max(1, len(known) - 1)
+
+    def place(value: float) -> float:
+        return (bisect_left(known, value) + bisect_right(known, value) - 1) / 2 / most
+
+    return [None if value is None else place(value) for value in row]
 
 
 def _table(found: Mapping[str, Any]) -> Table:

@@ -21,8 +21,9 @@ def fan(run: RunFiles) -> Panel:
     if not steps or not strata:
         return _older(run, anchor, title)
     text = (
-        "Each snapshot of the reward on the same steps (line: median; bands: the middle half and nine tenths): "
-        "a reward that knows the task puts expert play on top and random play at the bottom, with the noisy "
+        "Each snapshot of the reward on the same steps (line: median; bands: the middle half and nine "
+        "tenths): a reward that knows the task puts expert play on top and random play at the "
+        "bottom, with the noisy "
         "expert between. Where the bands lie on each other it cannot tell them apart."
     )
     views = [View("as it is", (figure(steps, strata, "learned reward of a step (nats)"),))]

@@ -70,7 +70,7 @@ def _table(run: RunFiles) -> Table:
         "peak_step": "step at which gold is highest",
         "drop": "share of the gain in gold that was lost again by the end",
         "gap": "proxy less gold at the end, in standard deviations",
-        "decoupling_step": "step from which the two no longer rise together",
+        "decoupling_step": "first step of a window in which the two do not rise together",
     }
     rows = [(words, number(run.evaluation, f"proxy_gold.{key}")) for key, words in meanings.items()]
     return Table(("measured", "value"), rows, "Over-optimisation")

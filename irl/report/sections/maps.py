@@ -29,8 +29,9 @@ def maps(run: RunFiles) -> Panel:
     )
     chosen = next((i for i, row in enumerate(whole) if row["n"] == 50), 0)
     text = (
-        "Left: the distance of every two snapshots, 0 the same, 1 the opposite; read the last row for the hand-written reward. "
-        "Right: the same as a path in a plane: a reward that is learning walks towards the star and stops; "
+        "The heat map is the distance of every two snapshots, 0 the same, 1 the opposite, with the "
+        "hand-written reward in the last row; the path is the same in a plane: a reward that is "
+        "learning walks towards the star and stops; "
         "one that goes round, or stops far away, has not found it. Longer segments forgive shaping."
     )
     return Panel(

@@ -23,8 +23,9 @@ def moved(run: RunFiles) -> Panel:
         reason = "the run has no snapshots that were compared, and no discriminator in metrics.jsonl"
         return absent(anchor, title, reason, f"irl evaluate {run.name}")
     text = (
-        "Above, how far the reward moved since the snapshot before; in the middle, how much of it was offset, "
-        "scale or shape, of which only shape asks for other steps (an offset too, where episodes can end "
+        "Above, how far the reward moved since the snapshot before; in the middle, how much of it was "
+        "offset, scale or shape, of which only shape asks for other steps (an offset too, where "
+        "episodes can end "
         "early); below, the discriminator: at 50 % it cannot tell the policy from the expert and its reward "
         "has nothing left to say, near 100 % it tells everything apart and the reward is steep."
     )

@@ -18,7 +18,8 @@ def policy(run: RunFiles) -> Panel:
     known = {who: number(run.evaluation, f"references.{who}.return_mean") for who in REFERENCES}
     references = {who: value for who, value in known.items() if value is not None}
     text = (
-        "The return that the task pays and the learner never sees (return_mean): the thin line is the exploring policy"
+        "The return that the task pays and the learner never sees: the thin line is the exploring policy "
+        "(return_mean)"
         + ("; the markers are the deterministic policy (eval_return_mean)" if evaluated else "")
         + ("; it should climb to the expert's line." if "expert" in references else ".")
     )

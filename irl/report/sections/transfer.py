@@ -17,8 +17,8 @@ def transfer(run: RunFiles) -> Panel:
         reason = "no policy was retrained on this reward, which is the strongest test of it"
         return absent(anchor, title, reason, f"irl retrain {run.name}")
     text = (
-        "The strongest test: a policy that has seen neither demonstrations nor discriminator, on the reward as "
-        "it stands. A score near 1 means that the reward alone teaches the task; one near 0 that it only "
+        "The strongest test: a policy that has seen neither demonstrations nor discriminator, on the reward "
+        "as it stands. A score near 1 means that the reward alone teaches the task; one near 0 that it only "
         "worked beside the policy it was learned with."
     )
     return Panel(anchor, title, text, "retrain", tables=tuple(tables))

@@ -1,4 +1,4 @@
-"""Whether the page's own numbers can be trusted: self-tests, coverage, versions, hashes, formula, citation."""
+"""Whether the page can be trusted: self-tests, coverage, versions, hashes, formula, citation."""
 
 import hashlib
 from collections.abc import Mapping
@@ -41,7 +41,7 @@ def _self_tests(run: RunFiles) -> Table | None:
 
 
 def _segments(n: object) -> str:
-    return "whole episodes" if n == 0 else f"{n} steps"
+    return "whole episodes" if n == 0 else "1 step" if n == 1 else f"{n} steps"
 
 
 def _coverage(run: RunFiles) -> Table | None:

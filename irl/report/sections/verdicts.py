@@ -64,11 +64,11 @@ def _card(row: Mapping[str, Any]) -> str:
     numbers += "" if threshold is None else f" <span>threshold {threshold:g}</span>"
     said = row.get("reason") if how == "unknown" and row.get("reason") else row.get("sentence")
     link = f'<a href="#{LINKS[name]}">look</a>' if name in LINKS else ""
+    mark = f'<span class="mark" role="img" aria-label="{_SPOKEN[how]}">{_WORDS[how]}</span>'
+    rule = f"<details><summary>rule</summary>{escape(str(row.get('rule') or ''))}</details>"
     return (
-        f'<li class="{how}"><h3><span class="mark" role="img" aria-label="{_SPOKEN[how]}">{_WORDS[how]}</span> '
-        f"{escape(name)}: {fired}</h3><p>{escape(str(said or ''))}</p>"
-        f'<p class="number">{numbers} {link}</p><details><summary>rule</summary>{escape(str(row.get("rule") or ""))}'
-        f"</details></li>"
+        f'<li class="{how}"><h3>{mark} {escape(name)}: {fired}</h3><p>{escape(str(said or ""))}</p>'
+        f'<p class="number">{numbers} {link}</p>{rule}</li>'
     )
 
 

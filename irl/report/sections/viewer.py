@@ -12,7 +12,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from irl.report.folder import RunFiles, finite, lookup
-from irl.report.markup import controlled, embedded
+from irl.report.markup import controlled, drawing, embedded
 from irl.report.palette import ACCENT, INK, OTHERS, framed
 from irl.report.panel import Panel, plain, unmeasured
 from irl.report.readings import amount
@@ -48,7 +48,7 @@ def traces(row: Mapping[str, Any]) -> dict[str, list[float | None]]:
     return {"learned": row["learned"], "hand-written": row["hand_written"], **named}
 
 
-def figure(series: Mapping[str, Sequence[float | None]], dt: float | None, what: str) -> go.Figure:
+def figure(series: Mapping[str, Sequence[float | None]], dt: float | None) -> go.Figure:
     """A row a trace, each with its own scale, over the same steps."""
     drawn = make_subplots(rows=len(series), cols=1, shared_xaxes=True, vertical_spacing=0.03)
     colours = [ACCENT, INK, *OTHERS]
@@ -64,14 +64,13 @@ def figure(series: Mapping[str, Sequence[float | None]], dt: float | None, what:
             row=i + 1,
             col=1,
         )
-        drawn.update_yaxes(title_text=plain(name), row=i + 1, col=1)
     framed(drawn, "", "", height=ROW * len(series) + 60)
     for i, name in enumerate(series):
         drawn.update_yaxes(
             title={"text": plain(name), "font": {"size": 11}, "standoff": 4}, nticks=3, row=i + 1, col=1
         )
-    seconds = "" if dt is None else f" ({dt:.3g} s each)"
-    drawn.update_xaxes(title_text=f"{what}; step of the episode{seconds}", row=len(series), col=1)
+    seconds = "" if dt is None else f" ({dt:.3g} s)"
+    drawn.update_xaxes(title_text=f"step{seconds}", row=len(series), col=1)
     return drawn.update_layout(hovermode="x", meta={"cursor": True})
 
 
@@ -81,14 +80,15 @@ def _episode(run: Path, row: Mapping[str, Any], name: str, pictures: bool) -> st
     steps = len(series["learned"])
     picture, why = _film(run, row) if pictures else (None, "left out to keep the page small")
     screen = (
-        f'<canvas width="{picture["width"]}" height="{picture["height"]}" role="img" aria-label="picture of the step"></canvas>'
+        f'<canvas width="{picture["width"]}" height="{picture["height"]}" role="img" '
+        'aria-label="picture of the step"></canvas>'
         if picture
         else f'<p class="absent">No pictures: {escape(why.rstrip("."))}.</p>'
     )
     file = re.sub(r"[^A-Za-z0-9._-]", "-", name)
     drawn = "".join(
-        _figure(figure(values, dt, what), f"{file}-{kind}")
-        for values, what, kind in ((series, "reward of each step", "steps"), (sums, "sum so far", "sums"))
+        drawing(figure(values, dt), f"{file}-{kind}", what)
+        for values, what, kind in ((series, "Reward of each step", "steps"), (sums, "Sum so far", "sums"))
     )
     data = {"film": picture, "dt": dt, "series": series, "sums": sums}
     return (
@@ -97,19 +97,6 @@ def _episode(run: Path, row: Mapping[str, Any], name: str, pictures: bool) -> st
         f'<label>step <output>0</output><input type="range" min="0" max="{steps - 1}" value="0" '
         f'aria-label="step of the episode"></label></div><table class="readout"><thead><tr><th>reward</th>'
         f"<th>this step</th><th>sum so far</th></tr></thead><tbody></tbody></table></div>{drawn}</div>"
-    )
-
-
-def _figure(drawn: go.Figure, name: str) -> str:
-    height = drawn.layout.height  # pyright: ignore[reportAttributeAccessIssue]
-    buttons = "".join(
-        f'<button type="button" data-take="{kind}" aria-label="{name} as {kind.upper()}">{kind.upper()}</button>'
-        for kind in ("csv", "json")
-    )
-    return (
-        f'<figure class="plot" data-file="{name}"><div class="drawing" style="height:{height}px"></div>'
-        f'<script type="application/json">{embedded(drawn.to_plotly_json())}</script>'
-        f'<div class="take">take the numbers: {buttons}</div></figure>'
     )
 
 

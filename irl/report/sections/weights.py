@@ -22,13 +22,16 @@ def weights(run: RunFiles) -> Panel:
     if not isinstance(known, Mapping) or not known:
         return unmeasured(run, anchor, title, "terms.weights")
     text = (
-        "Above, what one deviation of each term moves the learned reward by, with 95 % intervals; below, the share of its variance that "
-        "each term, a potential's shaping and none of them account for. A faithful reward pays the terms "
-        "of the hand-written one in its proportions and leaves little unexplained. A weight marked as not identifiable is no evidence either way."
+        "Above, what one deviation of each term moves the learned reward by, with 95 % intervals; below, the "
+        "share of its variance that each term, a potential's shaping and none of them account "
+        "for. A faithful "
+        "reward pays the terms in the proportions of the hand-written one and leaves little unexplained. A "
+        "weight marked as not identifiable is no evidence either way."
     )
     over = lookup(run.evaluation, "drift.pictures.terms")
-    steps = over.get("snapshots") if isinstance(over, Mapping) else None
-    views = one(figure(over, steps)) if isinstance(over, Mapping) and _whole(over, steps) else ()
+    views = ()
+    if isinstance(over, Mapping) and isinstance(steps := over.get("snapshots"), list) and _whole(over, steps):
+        views = one(figure(over, steps))
     tables = tuple(table for table in (_table(run, known), _residual(run)) if table is not None)
     return Panel(anchor, title, text, "terms", views, tables=tables, notes=_notes(run))
 
@@ -125,7 +128,7 @@ def _table(run: RunFiles, known: Mapping[str, Any]) -> Table:
         why_not = lookup(row, "why_not")
         flag = f"not identifiable: {why_not}" if isinstance(why_not, str) else "identifiable"
         rows.append((str(name), *(number(row, key) for key in keys), flag))
-    for name, key in (("a potential's shaping", "shaping"), ("all of it", "explained")):
+    for name, key in (("a potential's shaping", "shaping"), ("terms and shaping together", "explained")):
         rows.append((name, "", "", "", "", number(run.evaluation, f"terms.{key}"), ""))
     head = ("term", "weight", "95 % low", "high", "standardised", "share", "can it be known?")
     return Table(head, rows, "The last snapshot's terms")
