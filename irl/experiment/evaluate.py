@@ -23,6 +23,7 @@ from irl.envs.make import make
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Imitation
 from irl.experiment.draw import drawn_again
+from irl.experiment.filmed import record
 from irl.experiment.gate import broken, read_gate
 from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.probed import Asked, Named, probed
@@ -60,9 +61,12 @@ class Evaluate:
     """Distances to give beside VAL."""
     gate: Path | None = None
     """TOML file of bounds (irl/experiment/gate.py says which); where one is broken the exit status is 1."""
+    frames: int = 60
+    """Pictures of an episode for the report, at most; 0 draws none."""
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "episodes", "probe_steps")
+        check_at_least(self, 0, "frames")
         check_seed(self.seed)
 
 
@@ -131,6 +135,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "terms": found.terms,
         "drift": {**drift, **found.drift},
         **found.trust,
+        "episodes": record(folder.path, config.env_id, episodes, rewards[steps], command.frames),
     }
 
 
