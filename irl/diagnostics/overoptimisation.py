@@ -1,6 +1,7 @@
 """A proxy against gold over a run: does the true return still rise while the learned one does?
 
     drop          (gold_peak - gold_end) / (gold_peak - gold_0)
+    lost          the same with the return of random actions for gold_0
     gap           z(proxy)_end - z(gold)_end                      z over the points
     decoupling    where the first window of 5 points begins in which Spearman(proxy, gold) <= 0
     fit           gold(d) - gold(0) = d (alpha - beta log d),     peak at d* = exp(alpha / beta - 1)
@@ -176,9 +177,9 @@ def aicc(residuals: Points, parameters: int) -> float:
 
 def _z(values: Points) -> float:
     """How many standard deviations above the mean the last one is."""
-    return (
-        float((values[-1] - values.mean()) / values.std()) if not statistics.is_constant(values) else math.nan
-    )
+    if statistics.is_constant(values):
+        return math.nan
+    return float((values[-1] - values.mean()) / values.std())
 
 
 def standard_errors(returns: Sequence[Float[np.ndarray, "_"]]) -> Points:

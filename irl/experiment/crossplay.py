@@ -5,7 +5,7 @@ probe's expert, middling, noisy and random strata, and what is after something e
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -154,6 +154,6 @@ def _second_tasks(env_id: str, root: Path | None) -> tuple[list[tuple[str, ActFn
     return [*found, (STILL, _still(space))], notes
 
 
-def _still(space: Box) -> Callable[[np.ndarray], np.ndarray]:
+def _still(space: Box) -> ActFn:
     middle = (space.low.astype(np.float64) + space.high) / 2.0
     return lambda obs: middle
