@@ -29,8 +29,9 @@ from irl.core.types import Metrics, RewardFn
 from irl.envs.discrete import OneHot
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
+from irl.learners.ppo_choices import SB3Update
 from irl.learners.ppo_rollout import Rollouts
-from irl.learners.ppo_update import PPOUpdate, SB3Update
+from irl.learners.ppo_update import PPOUpdate
 from irl.learners.random_state import read_global, write_global
 from irl.learners.vec import RecordingVecEnv
 from irl.policies.policy import Policy, PolicySpec
