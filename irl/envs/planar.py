@@ -76,11 +76,13 @@ class Planar:
         Raises:
             UserError: an observation is not finite.
         """
+        # the bindings have it, their type stubs lack it
+        step = getattr(mujoco, "mj_step")  # noqa: B009
         before, lengths, all_qpos, all_qvel = self._before, self._lengths, self._qpos, self._qvel
         for i, (model, data, ctrl, qpos, qvel) in enumerate(self._simulators):
             before[i] = qpos[0]
             ctrl[:] = actions[i]
-            mujoco.mj_step(model, data, self._skip)
+            step(model, data, self._skip)
             all_qpos[i], all_qvel[i] = qpos, qvel
             lengths[i] = self._envs[i].note(actions[i])
         obs = self._observed()
