@@ -86,7 +86,7 @@ def attribute(
         ValueError: there are fewer than two episodes, they have no terms in common, or the learned reward is
             of other steps or not finite.
     """
-    names = _names(episodes, learned)
+    names = names_of(episodes, learned)
     constant = [name for name in names if _is_constant(episodes, name)]
     varying = [name for name in names if name not in constant]
     mean, std = moments(episodes)
@@ -122,7 +122,13 @@ class _Fit:
     shares: np.ndarray
 
 
-def _names(episodes: Sequence[Episode], learned: Sequence[np.ndarray]) -> list[str]:
+def names_of(episodes: Sequence[Episode], learned: Sequence[np.ndarray]) -> list[str]:
+    """The terms that every episode has recorded.
+
+    Raises:
+        ValueError: there are fewer than two episodes or no such term, or the learned reward is of other steps
+            or not finite.
+    """
     if len(episodes) < 2:
         raise ValueError(f"weights and their intervals need two episodes or more, not {len(episodes)}")
     ours, theirs = [len(r) for r in learned], [len(e) for e in episodes]

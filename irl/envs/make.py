@@ -18,6 +18,7 @@ from gymnasium.spaces import Box, Dict, Discrete
 
 from irl.core.errors import UserError
 from irl.envs.discrete import OneHotActions
+from irl.envs.dynamics import DYNAMICS, MODEL, changed_model
 from irl.envs.flatten import OBS_KEYS, FlatKeys
 from irl.envs.guard import Guarded
 from irl.envs.names import split_name
@@ -40,7 +41,7 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
     """The Gymnasium environment called `env_id`, with a flat observation and a bounded flat action.
 
     A choice of actions becomes a row for each (`irl.envs.discrete`), observations in a dictionary the row
-    of those parts that `obs_keys` names.
+    of those parts that `obs_keys` names; `dynamics` changes a MuJoCo model (`irl.envs.dynamics`).
 
     Args:
         env_id: full name (`irl.envs.names`), e.g. `Hopper-v5`; `module:Name-v0` imports `module` first.
@@ -52,7 +53,8 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
     env_id, named = split_name(env_id)
     kwargs = named | kwargs
     keys = kwargs.pop(OBS_KEYS, None)
-    env = _made(env_id, kwargs)
+    changes = kwargs.pop(DYNAMICS, None)
+    env = _made(env_id, kwargs) if changes is None else _under(changes, env_id, kwargs)
     try:
         if keys is not None:
             env = FlatKeys(env, env_id, [keys] if isinstance(keys, str) else keys)
@@ -63,6 +65,20 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
         env.close()
         raise
     return Guarded(env, env_id)
+
+
+def _under(changes: object, env_id: str, kwargs: dict[str, Any]) -> gym.Env:
+    """The environment under other dynamics; its specification names those, not a file that is gone."""
+    if MODEL in kwargs:
+        raise UserError(
+            f"{env_id} is given {MODEL} and {DYNAMICS}; change the file, and leave {DYNAMICS} away"
+        )
+    with changed_model(env_id, changes) as model:
+        env = _made(env_id, kwargs | model)
+    if (spec := env.unwrapped.spec) is not None:
+        del spec.kwargs[MODEL]
+        spec.kwargs[DYNAMICS] = changes
+    return env
 
 
 def _made(env_id: str, kwargs: dict[str, Any]) -> gym.Env:

@@ -29,6 +29,7 @@ from irl.diagnostics.trajectory import pair_flips, trajectory
 from irl.experiment.distances import as_json
 from irl.experiment.judge import finite
 from irl.experiment.logits import Snapshot
+from irl.experiment.pictured import pictures
 from irl.experiment.progress import Report
 from irl.rewards.mujoco import HandWritten
 
@@ -70,7 +71,9 @@ def judge_snapshots(
         tick(f"reward at {at}")
     columns = np.column_stack(list(rewards.values()))
     gamma = next(iter(snapshots.values())).reward.spec.gamma
-    found = _where(columns, steps, gamma, seed)
+    of = compare.columns(read(HandWritten(), steps.batch), columns, steps, gamma, seed)
+    left = val.canonical(of, seed)
+    found = _where(left, seed)
     tick("distances")
     healths = []
     for at, snapshot in snapshots.items():
@@ -87,17 +90,16 @@ def judge_snapshots(
         "parts": parts,
         "normaliser": _normaliser(snapshots, steps),
         "outside": [finite(covered.outside(from_episodes(list(played.fresh[at])))) for at in snapshots],
+        "pictures": pictures(left, base, list(snapshots), _of_the_last(snapshots, played), found["n"], seed),
         "cost": {"rewards": len(steps.batch) * (len(snapshots) + asked)},
     }
 
 
-def _where(columns: Float[np.ndarray, "N S"], steps: Stack, gamma: float, seed: int) -> dict[str, Any]:
+def _where(left: val.Canonical, seed: int) -> dict[str, Any]:
     """Where each snapshot is: its distance to the hand-written reward, and to the other snapshots."""
-    truth = read(HandWritten(), steps.batch)
-    of = compare.columns(truth, columns, steps, gamma, seed)
-    left = val.canonical(of, seed)
-    n = val.longest(steps.layout)
-    sums = segments(left.errors, steps.layout, gamma, n)
+    of = left.columns
+    n = val.longest(of.steps.layout)
+    sums = segments(left.errors, of.steps.layout, of.gamma, n)
     asked = slice(1, 1 + of.asked)
     moved = trajectory(sums.values[:, asked], sums.values[:, 0], np.max(np.abs(of.usable[:, asked]), axis=0))
     return {
@@ -131,6 +133,12 @@ def _health(snapshot: Snapshot, played: Played, fresh: Sequence[Episode]) -> dic
     found["slope_p99"] = finite(float(np.quantile(slopes, 0.99)))
     found["label_prior"] = 0.5
     return found
+
+
+def _of_the_last(snapshots: Mapping[int, Snapshot], played: Played) -> Float[np.ndarray, "F S"]:
+    """Every snapshot's reward on the same steps of the last one's policy."""
+    steps = from_episodes(list(played.fresh[max(snapshots)]))
+    return np.column_stack([read(snapshot.reward, steps) for snapshot in snapshots.values()])
 
 
 def _logits(snapshot: Snapshot, batch: Transitions) -> Float[np.ndarray, "B"]:

@@ -1,5 +1,6 @@
 """`irl evaluate`: the policy and the reward of a run in numbers, and one page to look at."""
 
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from irl.envs.make import make
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Imitation
 from irl.experiment.draw import drawn_again
+from irl.experiment.filmed import record
+from irl.experiment.gate import broken, read_gate
 from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.probed import Asked, Named, probed
 from irl.experiment.progress import each_episode, progress
@@ -56,15 +59,26 @@ class Evaluate:
     """Steps of each stratum of the probe that is played; numbers of other sizes do not compare."""
     also: tuple[Named, ...] = ()
     """Distances to give beside VAL."""
+    gate: Path | None = None
+    """TOML file of bounds (irl/experiment/gate.py says which); where one is broken the exit status is 1."""
+    frames: int = 60
+    """Pictures of an episode for the report, at most; 0 draws none."""
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "episodes", "probe_steps")
+        check_at_least(self, 0, "frames")
         check_seed(self.seed)
 
 
 def evaluate(command: Evaluate) -> None:
-    """Evaluate, write, print."""
+    """Evaluate, write, print; with a gate, see whether it is passed.
+
+    Raises:
+        SystemExit: 1, a bound of the gate is broken.
+    """
     folder = records.open_run(command.run)
+    # what is malformed is said before anything is played
+    gate = None if command.gate is None else read_gate(command.gate)
     files.check_writable(target := folder.path / "evaluation.json")
     began = time.monotonic()
     result = evaluation(folder, command)
@@ -76,6 +90,10 @@ def evaluate(command: Evaluate) -> None:
         asked = f"{cost['rewards']:,} rewards were asked for"
         console.print(f"judged in {time.monotonic() - began:.0f} s; {asked}", highlight=False)
     console.print(f"report: {report}", highlight=False, markup=False, soft_wrap=True)
+    if lines := broken(gate, result) if gate else []:
+        for line in lines:
+            print(f"irl: {command.gate}: {line}", file=sys.stderr)
+        raise SystemExit(1)
 
 
 def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
@@ -100,7 +118,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     reward = judge_reward(rewards[steps], judged, command.seed)
     drift = judge_drift(rewards, judged)
     asked = Asked(command.probe, command.probe_steps, command.also, command.seed, command.policies_root)
-    distances, terms, more = probed(config, demos, policies, rewards, asked)
+    found = probed(config, demos, policies, rewards, asked)
     if not demos.held_out:
         reward["notes"].append("No demonstration is held out: the expert's steps are those trained on.")
     return {
@@ -113,9 +131,11 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "policy": _policy(episodes, references),
         "references": references,
         "reward": reward,
-        "distances": distances,
-        "terms": terms,
-        "drift": {**drift, **more},
+        "distances": found.distances,
+        "terms": found.terms,
+        "drift": {**drift, **found.drift},
+        **found.trust,
+        "episodes": record(folder.path, config.env_id, episodes, rewards[steps], command.frames),
     }
 
 

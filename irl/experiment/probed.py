@@ -1,6 +1,6 @@
 """What `irl evaluate` reads on a probe: distances of the reward, and how its snapshots drifted."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -10,17 +10,19 @@ from gymnasium.spaces import Box
 from irl.algorithms.probe_make import drawn, play
 from irl.algorithms.probe_set import ProbeSet
 from irl.core.rng import stream
-from irl.core.types import Episode, from_episodes
+from irl.core.types import Episode, Transitions, from_episodes
 from irl.demos.load import Demos
 from irl.envs.make import make
 from irl.envs.states import StateRecorder
 from irl.experiment.attributed import judge_terms
 from irl.experiment.configs import Imitation
+from irl.experiment.crossplay import play_policies
 from irl.experiment.distances import judge_distances
 from irl.experiment.drifting import Played, judge_snapshots
 from irl.experiment.logits import Snapshot
 from irl.experiment.probes import base_of, given, own_of
 from irl.experiment.progress import progress
+from irl.experiment.trusted import Seen, judge_trust, nothing
 from irl.policies import shelf
 from irl.policies.policy import Policy
 from irl.rewards.learned import LearnedReward
@@ -42,14 +44,26 @@ class Asked:
     policies_root: Path | None
 
 
+@dataclass(frozen=True)
+class Probed:
+    """Parts of evaluation.json."""
+
+    distances: dict[str, Any]
+    terms: dict[str, Any]
+    drift: dict[str, Any]
+    """What is added to it."""
+    trust: dict[str, Any]
+    """The parts that `irl.experiment.trusted` names."""
+
+
 def probed(
     config: Imitation,
     demos: Demos,
     policies: Mapping[int, Policy],
     rewards: Mapping[int, LearnedReward],
     asked: Asked,
-) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """The `distances` and `terms` of evaluation.json, and what is added to its `drift`.
+) -> Probed:
+    """What is read on a probe.
 
     Where demonstrations have no actions and the shelf no expert there is nothing to compare on: a reason.
 
@@ -57,43 +71,52 @@ def probed(
         UserError: the probe that was given is of another task, or damaged.
     """
     expert = demos.held_out or demos.episodes
+    reward = rewards[max(rewards)]
     actions = demos[0].action.shape[1] > 0
     known = shelf.expert_card(config.env_id, asked.policies_root) is not None
     if asked.probe is None and not known and not actions:
         reason = "the demonstrations have no actions, and the shelf no expert"
-        return {"headline_reason": reason}, {"reason": reason}, {}
+        return Probed({"headline_reason": reason}, {"reason": reason}, {}, nothing(reason, reward))
     if asked.probe is not None:
         probe = given(asked.probe, config.env_id)
     else:
         probe = base_of(config.env_id, asked.policies_root, expert, asked.steps)
     own = {name: episodes for name, episodes in probe.items() if name not in probe.base}
     base, own = probe.base, own or dict(own_of(config.env_id, policies, asked.steps))
-    reward = rewards[max(rewards)]
     distances = judge_distances(reward, base, own, asked.also, asked.seed)
     terms = judge_terms(reward, base, reward.spec.gamma, asked.seed)
-    return distances, terms, _drift(config, demos, policies, rewards, base, asked)
+    fresh = _fresh(config.env_id, policies, min(FRESH, asked.steps))
+    drift = _drift(demos, policies, rewards, base, fresh, asked.seed)
+    played = play_policies(config.env_id, policies, base, asked.seed, asked.policies_root)
+    seen = Seen(rewards, base, played, _held_out(demos), fresh)
+    return Probed(distances, terms, drift, judge_trust(seen, drift, asked.seed))
+
+
+def _fresh(env_id: str, policies: Mapping[int, Policy], steps: int) -> dict[int, tuple[Episode, ...]]:
+    found = {}
+    with progress("fresh play", len(policies)) as report:
+        for i, (at, policy) in enumerate(policies.items(), 1):
+            found[at] = fresh_episodes(env_id, policy, at, steps)
+            report(i, f"policy at {at}")
+    return found
 
 
 def _drift(
-    config: Imitation,
     demos: Demos,
     policies: Mapping[int, Policy],
     rewards: Mapping[int, LearnedReward],
     base: ProbeSet,
-    asked: Asked,
+    fresh: Mapping[int, Sequence[Episode]],
+    seed: int,
 ) -> dict[str, Any]:
     both = {at: Snapshot(rewards[at], policies[at]) for at in rewards}
-    total = 3 * len(both) + 1
-    with progress("drift", total) as report:
-        fresh = {}
-        for i, (at, policy) in enumerate(policies.items(), 1):
-            fresh[at] = fresh_episodes(config.env_id, policy, at, min(FRESH, asked.steps))
-            report(i, f"policy at {at}")
-        held_out = from_episodes(list(demos.held_out)) if demos.held_out else None
-        played = Played(from_episodes(list(demos.episodes)), held_out, fresh)
-        return judge_snapshots(
-            both, base, played, asked.seed, lambda done, words: report(len(both) + done, words)
-        )
+    played = Played(from_episodes(list(demos.episodes)), _held_out(demos), fresh)
+    with progress("drift", 2 * len(both) + 1) as report:
+        return judge_snapshots(both, base, played, seed, report)
+
+
+def _held_out(demos: Demos) -> Transitions | None:
+    return from_episodes(list(demos.held_out)) if demos.held_out else None
 
 
 def fresh_episodes(env_id: str, policy: Policy, at: int, steps: int) -> tuple[Episode, ...]:

@@ -6,9 +6,10 @@ from random weights, on the reward as it stands. The learner sees the learned re
 normalised as the reward normalises them, by a copy that does not move.
 """
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import torch
 import tyro
@@ -17,8 +18,9 @@ from irl.core import records
 from irl.core.config import MOST_SEED, check_at_least, check_seed, check_threads, from_json, to_json
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
+from irl.envs.dynamics import DYNAMICS
 from irl.envs.make import check_module
-from irl.envs.names import full_name
+from irl.envs.names import full_name, split_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import OFF_POLICY, Imitation, RetrainRun, Watch, Words
@@ -30,6 +32,7 @@ from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 from irl.policies.policy import save_policy
 
+Seeds = Annotated[tuple[int, ...], tyro.conf.arg(metavar="SEED ...")]
 SEED_APART = 1000
 """The seed is that of the run and this, unless one is typed: no stream of the run is used again."""
 
@@ -50,12 +53,18 @@ class Retrain:
     env_kwargs: Words = ()
     """Retrain where the task is another: what the environment is given beside what the run's was, name=value
     or a JSON object. Observations and actions must be of the same sizes."""
+    dynamics: Words = ()
+    """Retrain under other dynamics of a MuJoCo task: mass, gravity, friction or damping by a factor, e.g.
+    gravity=0.5; disabled_legs=2 of the ant."""
     algo: Literal["ppo", "sac"] | None = None
     """Which learner; the run's own unless given."""
     steps: int | None = None
     """Environment steps; as many as the run's unless given."""
     seed: int | None = None
     """Seed of everything random; the run's + 1000 unless given."""
+    seeds: Seeds = ()
+    """Several, one after the other, each into a folder of its own, in --out where it is given. RUN's
+    retrained.json then has their ratio to the policy beside the reward; what is done is not done again."""
     out: Path | None = None
     """Run folder; runs/retrain-<run>-<step>[-<part>][-<task>]-<algo>-s<seed> unless given; the task where it
     is not the run's."""
@@ -77,12 +86,16 @@ class Retrain:
             raise ValueError("name the run whose reward it is, or a run to go on with by --resume")
         if self.steps is not None:
             check_at_least(self, 1, "steps")
-        if self.seed is not None:
-            check_seed(self.seed)
+        for seed in (*self.seeds, *(() if self.seed is None else (self.seed,))):
+            check_seed(seed)
+        if self.seeds and (self.seed is not None or self.resume is not None):
+            raise ValueError("--seeds begins or goes on with each of them; leave --seed and --resume away")
+        if len(set(self.seeds)) < len(self.seeds):
+            raise ValueError(f"--seeds {' '.join(map(str, self.seeds))} names one twice")
 
 
-def retrain(command: Retrain) -> None:
-    """Train, then measure by both rewards."""
+def retrain_one(command: Retrain) -> None:
+    """Train with one seed, then measure by both rewards."""
     config, folder = _begun(command) if command.resume is None else _resumed(command)
     torch.set_num_threads(config.threads)
     reward = frozen_again(config, folder)
@@ -109,7 +122,7 @@ def _begun(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:
     check_module(its.env_id, str(source.path / "config.json"))
     build.check_device(command.device)
     step, snapshot = snapshot_of(source, command.snapshot)
-    config = _settled(command, its, step)
+    config = settled(command, its, step)
     reward = frozen(config, snapshot, command.part)
     there = records.RunFolder(config.out)
     if (config.out / "config.json").is_file() and there.config.get("kind") == RetrainRun.KIND:
@@ -122,16 +135,25 @@ def _begun(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:
     return config, records.create(config.out, to_json(config), made_by, record)
 
 
-def _settled(command: Retrain, its: Any, step: int) -> RetrainRun:
-    """The settings, with what the run decides filled in."""
+def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
+    """The settings, with what the run decides filled in.
+
+    Args:
+        its: the settings of the run.
+        step: of the snapshot.
+    Raises:
+        UserError: they are of a learner that is not used, or the seed is the run's own.
+    """
     assert command.run is not None
     algo = command.algo or its.learner.KIND
     for name, default in (("ppo", PPOConfig()), ("sac", OFF_POLICY)):
         if name != algo and getattr(command, name) != default:
             raise UserError(f"--{name}.* are settings of a learner that is not used; choose --algo {name}")
     seed = (its.seed + SEED_APART) % (MOST_SEED + 1) if command.seed is None else command.seed
+    if seed == its.seed:
+        raise UserError(f"seed {seed} is the run's own; a fresh policy has other streams: choose another")
     source = command.run.resolve()
-    env_id = full_name(its.env_id, command.env_kwargs)
+    env_id = full_name(its.env_id, (*command.env_kwargs, *_dynamics(command.dynamics)))
     of = f"-{command.part}" if command.part else ""
     of += f"-{task_name(env_id)}" if env_id != its.env_id else ""
     return RetrainRun(
@@ -146,6 +168,11 @@ def _settled(command: Retrain, its: Any, step: int) -> RetrainRun:
         device=command.device,
         threads=command.threads,
     )
+
+
+def _dynamics(words: Words) -> tuple[str, ...]:
+    """What `--dynamics` adds to the task's name."""
+    return (json.dumps({DYNAMICS: split_name(full_name("", words))[1]}),) if words else ()
 
 
 def _resumed(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:

@@ -19,6 +19,7 @@ from irl.envs.rollouts import rollouts
 from irl.experiment.configs import RetrainRun
 from irl.experiment.frozen import RECORD
 from irl.experiment.judge import finite
+from irl.experiment.overoptimised import over_run
 from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 from irl.policies.card import Card, normalised_score, summary
@@ -50,11 +51,21 @@ def report(config: RetrainRun, folder: RunFolder, reward: LearnedReward, policie
         "env_steps": steps,
         "true": _true(episodes, shelf.expert_card(config.env_id, policies_root)),
         "learned": _learned(reward, episodes),
+        "proxy_gold": _over_training(folder),
         "episodes": EPISODES,
         "episode_seeds": seeds,
     }
     files.write_json(folder.path / RESULT, result)
     Console().print(_table(result))
+
+
+def _over_training(folder: RunFolder) -> dict[str, Any]:
+    """Both returns at the evaluations while it trained: here the proxy is one reward all along."""
+    names = ("env_steps", "eval_learned_return_mean", "eval_return_mean")
+    rows = [[row.get(name) for name in names] for row in folder.metrics()]
+    known = [row for row in rows if None not in row]
+    steps, proxy, gold = zip(*known, strict=True) if known else ((), (), ())
+    return over_run(steps, proxy, gold)[0]
 
 
 def _true(episodes: Sequence[Episode], card: Card | None) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,13 @@ class RunFiles:
     evaluation: Mapping[str, Any]
     problems: Mapping[str, str]
     """File name -> one sentence on why it is empty or cut short."""
+    path: Path = Path()
+    retrained: Mapping[str, Any] = field(default_factory=dict)
+    """retrained.json: several policies trained on this run's frozen rewards."""
+    retrain: Mapping[str, Any] = field(default_factory=dict)
+    """retrain.json: this run is a policy trained on the frozen reward of another."""
+    reward: Mapping[str, Any] = field(default_factory=dict)
+    """spec.json of the last snapshot's reward."""
 
 
 def read_run(run: Path) -> RunFiles:
@@ -45,7 +52,17 @@ def read_run(run: Path) -> RunFiles:
         metrics=_read_lines(run / "metrics.jsonl", problems),
         evaluation=evaluation,
         problems=problems,
+        path=run,
+        retrained=_read_object(run / "retrained.json", {}),
+        retrain=_read_object(run / "retrain.json", {}),
+        reward=_read_object(last / "reward" / "spec.json", {}) if (last := last_snapshot(run)) else {},
     )
+
+
+def last_snapshot(run: Path) -> Path | None:
+    """The folder of the snapshot with the most steps; None where there is none."""
+    found = [p for p in run.glob("snapshots/*") if p.name.isdigit() and p.is_dir()]
+    return max(found, key=lambda p: int(p.name), default=None)
 
 
 def lookup(document: object, path: str) -> Any:

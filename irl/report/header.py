@@ -1,11 +1,11 @@
 """What the page says about the run itself: how it was made, and every setting of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from irl.report.folder import RunFiles, number
-from irl.report.readings import headline
+from irl.report.folder import RunFiles, lookup, number, texts
+from irl.report.summary import summary
 
 CHIEF_PACKAGES = ("irl", "torch", "stable-baselines3", "gymnasium", "mujoco", "numpy")
 
@@ -25,11 +25,29 @@ def header(run: RunFiles) -> str:
         "Machine": _joined(environment.get("machine"), _device(environment)),
         "Versions": _versions(environment),
     }
+    sentences = "".join(f"<li>{escape(sentence)}</li>" for sentence in summary(run))
     return (
         f"<header><h1>{escape(run.name)}</h1>"
         f'<p class="kind">{escape(str(kind))} on {escape(str(task))}, {steps:,.0f} environment steps</p>'
-        f'<p class="lead">{escape(headline(evaluation))}</p>{_facts(facts)}</header>'
+        f'<ul class="lead">{sentences}</ul>{_facts(facts)}</header>'
     )
+
+
+def head_of(runs: Sequence[RunFiles]) -> str:
+    """The title of a page of several runs."""
+    names = ", ".join(run.name for run in runs)
+    return f'<header><h1>{len(runs)} runs</h1><p class="kind">{escape(names)}</p></header>'
+
+
+def notes(run: RunFiles, prefix: str = "") -> str:
+    """What the evaluation and the reading of the files had to say."""
+    parts = [lookup(run.evaluation, part) for part in ("policy", "reward", "distances", "drift")]
+    found = [note for part in (*parts, run.evaluation) for note in texts(lookup(part, "notes"))]
+    found += run.problems.values()
+    if not found:
+        return ""
+    items = "".join(f"<li>{escape(note)}</li>" for note in dict.fromkeys(found))
+    return f'<section id="{prefix}notes" data-section="notes"><h2>Notes</h2><ul>{items}</ul></section>'
 
 
 def _commit(environment: Mapping[str, Any]) -> str | None:

@@ -1,25 +1,68 @@
-"""One page of a run: `report.html`, which needs no network and no other file.
+"""One page of a run or of several: `report.html`, which needs no network and no other file.
 
 Every string that comes from a file is escaped, and the page forbids itself to load anything.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Sequence
 from html import escape
+from importlib.resources import files as resources
 from pathlib import Path
-from typing import Any
 
 from plotly.offline import get_plotlyjs
 
 from irl.core import files
-from irl.report.folder import RunFiles, lookup, number, read_run, texts
-from irl.report.header import header, settings
-from irl.report.palette import STRATA, STRATUM_NAMES
-from irl.report.panels import Panel, panels
-from irl.report.readings import MISSING, amount, key_numbers, spread
-from irl.report.style import CSS
+from irl.core.errors import UserError
+from irl.report.folder import RunFiles, read_run
+from irl.report.header import head_of, header, notes, settings
+from irl.report.how import explained
+from irl.report.markup import Page, controlled
+from irl.report.panel import Panel, absent
+from irl.report.sections.agreement import agreement
+from irl.report.sections.compare import compare
+from irl.report.sections.crossplay import crossplay
+from irl.report.sections.fan import fan
+from irl.report.sections.gold import gold
+from irl.report.sections.maps import maps
+from irl.report.sections.moved import moved
+from irl.report.sections.policy import policy
+from irl.report.sections.transfer import transfer
+from irl.report.sections.trust import trust
+from irl.report.sections.verdicts import verdicts
+from irl.report.sections.viewer import viewer
+from irl.report.sections.weights import weights
 
+SECTIONS: tuple[Callable[[RunFiles], Panel], ...] = (
+    verdicts,
+    policy,
+    moved,
+    fan,
+    maps,
+    weights,
+    agreement,
+    viewer,
+    crossplay,
+    gold,
+    transfer,
+    trust,
+)
+"""In the order of the page."""
+NAMES = {
+    "verdicts": "Verdicts",
+    "policy": "Policy",
+    "moved": "Moved",
+    "fan": "Fan",
+    "map": "Map",
+    "terms": "Terms",
+    "against": "Against",
+    "episodes": "Episodes",
+    "crossplay": "Cross-play",
+    "gold": "Gold",
+    "retrain": "Retrain",
+    "trust": "Trust",
+}
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-PLOTLY = {"responsive": True, "displayModeBar": False}
+MOST_BYTES = 8_000_000
+"""What a page may weigh; further runs are left out of it, and said."""
 
 
 def write_report(run: Path) -> Path:
@@ -30,97 +73,102 @@ def write_report(run: Path) -> Path:
     Raises:
         UserError: there is no such folder.
     """
-    target = run / "report.html"
-    files.write_bytes(target, render(read_run(run)).encode())
+    return write_reports([run], run / "report.html")
+
+
+def write_reports(runs: Sequence[Path], target: Path, refresh_s: int | None = None) -> Path:
+    """The page of one or several runs, written to `target`.
+
+    Args:
+        refresh_s: seconds after which a browser reads the page again; never, unless given.
+
+    Raises:
+        UserError: one of the folders is not there, or none is named.
+    """
+    if not runs:
+        raise UserError("name the run folders that the report is about")
+    files.write_bytes(target, render([read_run(run) for run in runs], refresh_s).encode())
     return target
 
 
-def render(run: RunFiles) -> str:
+def render(runs: Sequence[RunFiles], refresh_s: int | None = None) -> str:
     """The page as text."""
-    shown = panels(run)
-    script = f"<script>{get_plotlyjs()}</script>" if any(panel.figure for panel in shown) else ""
-    body = [header(run), _numbers(run), *(_section(panel) for panel in shown), _notes(run), settings(run)]
+    body = _single(runs[0]) if len(runs) == 1 else _several(runs)
+    script = f"<script>{get_plotlyjs()}</script><script>{_own('page.js')}</script>"
+    title = runs[0].name if len(runs) == 1 else f"{len(runs)} runs"
+    again = "" if refresh_s is None else f'<meta http-equiv="refresh" content="{refresh_s}">'
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">{again}'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(run.name)}: report</title><style>{CSS}</style>{script}</head>"
-        f"<body><main>{''.join(body)}"
+        f"<title>{escape(title)}: report</title><style>{_own('page.css')}</style></head>"
+        f'<body><a class="skip" href="#main">To the content</a><main id="main">{body}{explained()}'
         "<noscript><p class='absent'>The figures are drawn by a script in this file.</p></noscript>"
         "<footer>Written by irl from the files of the run folder; write it again with "
-        "<code>irl evaluate</code>.</footer></main></body></html>\n"
+        f"<code>irl report</code>.</footer></main>{script}</body></html>\n"
     )
 
 
-def _numbers(run: RunFiles) -> str:
-    if not run.evaluation:
-        reason = run.problems.get("evaluation.json", "evaluation.json is empty")
-        return _titled("numbers", "Key numbers", _absent(f"Not shown: {reason}. `irl evaluate` writes it."))
-    rows = "".join(
-        f'<tr><th scope="row">{escape(row.name)}</th>'
-        f'<td class="value{" unknown" if row.value == MISSING else ""}">{escape(row.value)}</td>'
-        f'<td class="says">{escape(row.reading)}</td></tr>'
-        for row in key_numbers(run.evaluation)
+def _single(run: RunFiles) -> str:
+    return header(run) + _sections(run, Page())
+
+
+def _sections(run: RunFiles, page: Page, prefix: str = "", pictures: bool = True) -> str:
+    shown = [_safe(maker, run, pictures) for maker in SECTIONS]
+    links = "".join(
+        f'<a href="#{prefix}{panel.anchor}"{_MISSING if panel.missing else ""}>{NAMES[panel.anchor]}</a>'
+        for panel in shown
     )
-    head = "<thead><tr><th>Measured</th><th>Value</th><th>What it says</th></tr></thead>"
-    table = f'<table class="keys">{head}<tbody>{rows}</tbody></table>'
-    return _titled("numbers", "Key numbers", table + _strata(run))
+    sections = "".join(page.section(panel, prefix) for panel in shown)
+    nav = f'<nav aria-label="sections">{links}<a href="#how">How</a></nav>'
+    return nav + sections + notes(run, prefix) + settings(run)
 
 
-def _strata(run: RunFiles) -> str:
-    strata = lookup(run.evaluation, "reward.strata")
-    if not isinstance(strata, Mapping):
-        return ""
-    rows = []
-    for name in STRATA:
-        mean, std = number(strata, f"{name}.mean"), number(strata, f"{name}.std")
-        steps, hand_written = number(strata, f"{name}.steps"), number(strata, f"{name}.hand_written_mean")
-        within = number(strata, f"{name}.pearson")
-        cells = (
-            MISSING if mean is None else spread(mean, std),
-            MISSING if hand_written is None else amount(hand_written),
-            MISSING if within is None else f"{within:.2f}",
-            MISSING if steps is None else f"{steps:,.0f}",
-        )
-        dot = f'<span class="dot" style="background:{STRATA[name]}"></span>'
-        rows.append(f'<tr><th scope="row">{dot}{STRATUM_NAMES[name]}</th>{_cells(cells)}</tr>')
-    columns = ("Mean reward of a step", "learned", "hand-written", "Pearson within", "steps")
-    head = f"<tr>{''.join(f'<th>{column}</th>' for column in columns)}</tr>"
-    return f'<table class="strata"><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table>'
+_MISSING = ' class="missing" title="not shown: see there"'
 
 
-def _cells(values: Iterable[str]) -> str:
-    return "".join(f"<td>{escape(value)}</td>" for value in values)
+def _safe(maker: Callable[[RunFiles], Panel], run: RunFiles, pictures: bool) -> Panel:
+    """A section, or that the files of this one are damaged: a report of half a run is better than none."""
+    name = {
+        "maps": "map",
+        "weights": "terms",
+        "agreement": "against",
+        "viewer": "episodes",
+        "transfer": "retrain",
+    }
+    try:
+        return viewer(run, pictures) if maker is viewer else maker(run)
+    except (
+        TypeError,
+        ValueError,
+        KeyError,
+        IndexError,
+        AttributeError,
+        OverflowError,
+        ZeroDivisionError,
+    ) as error:
+        anchor = name.get(maker.__name__, maker.__name__)
+        reason = f"what the run folder holds of it cannot be read ({type(error).__name__})"
+        return absent(anchor, NAMES[anchor], reason, f"irl evaluate {run.name}")
 
 
-def _section(panel: Panel) -> str:
-    if panel.figure is None:
-        return _titled(panel.anchor, panel.title, _absent(panel.text))
-    figure = panel.figure.to_html(
-        full_html=False, include_plotlyjs=False, config=PLOTLY, div_id=f"figure-{panel.anchor}"
-    )
-    return _titled(panel.anchor, panel.title, f'<p class="reading">{escape(panel.text)}</p>{figure}')
+def _several(runs: Sequence[RunFiles]) -> str:
+    """The comparison, and a tab a run."""
+    page = Page()
+    parts = [head_of(runs), page.section(compare(runs))]
+    names, bodies = [], []
+    left = MOST_BYTES - len(get_plotlyjs().encode()) - 200_000
+    for i, run in enumerate(runs):
+        body = header(run) + _sections(run, page, f"run{i}-", pictures=False)
+        left -= len(body.encode())
+        if left < 0:
+            reason = f"Not shown: the page would be too large. To have it: irl report {run.name}"
+            body = f'<p class="absent">{escape(reason)}</p>'
+        names.append(run.name)
+        bodies.append(f"<div>{body}</div>")
+    return "".join(parts) + controlled("runs", names, bodies, "tabs", "runs")
 
 
-def _notes(run: RunFiles) -> str:
-    notes = [
-        note for part in ("policy", "reward", "drift", "") for note in texts(_part(run, part).get("notes"))
-    ]
-    notes += [problem for name, problem in run.problems.items() if name != "evaluation.json" or notes]
-    if not notes:
-        return ""
-    items = "".join(f"<li>{escape(note)}</li>" for note in dict.fromkeys(notes))
-    return _titled("notes", "Notes", f"<ul>{items}</ul>")
-
-
-def _part(run: RunFiles, path: str) -> Mapping[str, Any]:
-    found = lookup(run.evaluation, path)
-    return found if isinstance(found, Mapping) else {}
-
-
-def _titled(anchor: str, title: str, content: str) -> str:
-    return f'<section id="{anchor}"><h2>{escape(title)}</h2>{content}</section>'
-
-
-def _absent(text: str) -> str:
-    return f'<p class="absent">{escape(text)}</p>'
+def _own(name: str) -> str:
+    """A file of this package."""
+    return resources("irl.report").joinpath(name).read_text(encoding="utf-8")

@@ -7,6 +7,29 @@ colour blindnesses and to have a contrast of 3 or more on the light and the dark
 import plotly.graph_objects as go
 
 STRATA = {"expert": "#2f7fc1", "policy": "#d9730d", "random": "#7d8590"}
+PLAY = STRATA | {"final policy": "#d9730d", "noisy expert": "#3fa796", "medium": "#9a55a8"}
+"""Kinds of play of the base probe, with the run's own policy."""
+DASHES = {
+    "expert": "solid",
+    "final policy": "solid",
+    "noisy expert": "dash",
+    "medium": "dot",
+    "random": "dashdot",
+}
+"""The same told apart without colour."""
+METHODS = {
+    "gail": "#2f7fc1",
+    "airl": "#d9730d",
+    "dac": "#3fa796",
+    "gail-sac": "#9a55a8",
+    "airl-sac": "#d8b441",
+    "bc": "#7d8590",
+}
+OTHERS = ("#2f7fc1", "#d9730d", "#3fa796", "#9a55a8", "#d8b441", "#7d8590")
+"""For names that are not known beforehand, in turn."""
+BLUES = [[0.0, "rgba(47,127,193,0.10)"], [1.0, "#2f7fc1"]]
+"""Of little to much; both ends readable on the light and the dark page."""
+SIGNED = [[0.0, "#2f7fc1"], [0.5, "rgba(128,128,128,0.12)"], [1.0, "#d9730d"]]
 STRATUM_NAMES = {"expert": "held-out expert", "policy": "policy", "random": "random"}
 DEMONSTRATIONS = "#3fa796"
 CHANGES = {"offset": "#d8b441", "scale": "#3fa796", "shape": "#9a55a8"}

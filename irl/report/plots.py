@@ -5,17 +5,14 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from irl.report.folder import column, finite
-from irl.report.palette import ACCENT, CHANGES, DEMONSTRATIONS, INK, STRATA, STRATUM_NAMES, faded, framed
+from irl.report.palette import DEMONSTRATIONS, STRATA, STRATUM_NAMES, faded, framed
 from irl.report.readings import amount
 
 STEPS = "environment steps"
 LINE_POINTS = 2000
 """More points than this on one line are thinned; no screen shows them."""
-TICKS = 14
-"""Most labels under the bars."""
 SCATTER_POINTS = 2000
 """Most points of one stratum in the scatter."""
 
@@ -28,7 +25,7 @@ def learning_curve(metrics: Sequence[Mapping[str, Any]], references: Mapping[str
         references: return_mean of `expert`, `demonstrations` and `random`, of those that are known.
     """
     figure = go.Figure()
-    x, y = _thinned(*column(metrics, "env_steps", "return_mean"))
+    x, y = thinned(*column(metrics, "env_steps", "return_mean"))
     colour = STRATA["policy"]
     figure.add_scatter(
         x=x, y=y, name="training episodes", mode="lines", line_width=1, line_color=faded(colour, 0.6)
@@ -103,61 +100,6 @@ def learned_against_hand_written(
     return framed(figure, "hand-written reward of a step", "learned reward of a step", height=460)
 
 
-def what_moved(changes: Sequence[Mapping[str, Any]]) -> go.Figure:
-    """From each snapshot to the next: the total change above, its three shares below."""
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, row_heights=[0.4, 0.6], vertical_spacing=0.07)
-    rows = [row for row in changes if all(finite(row.get(k)) is not None for k in ("to", "total", *CHANGES))]
-    places = list(range(len(rows)))
-    labels = [_short(float(row["to"])) for row in rows]
-    spans = [f"{_short(finite(row.get('from')) or 0.0)} to {_short(float(row['to']))} steps" for row in rows]
-    total = [float(row["total"]) for row in rows]
-    figure.add_scatter(
-        x=places, y=total, mode="lines+markers", line_color=INK, marker_size=7, showlegend=False,
-        customdata=spans, hovertemplate="%{customdata}: %{y:.3g}<extra></extra>", row=1, col=1,
-    )  # fmt: skip
-    for name, colour in CHANGES.items():
-        share = [
-            100 * float(row[name]) / size if size > 0 else None for row, size in zip(rows, total, strict=True)
-        ]
-        figure.add_bar(
-            x=places, y=share, name=name, marker_color=colour, row=2, col=1,
-            hovertemplate=f"{name} %{{y:.0f}} %<extra></extra>",
-        )  # fmt: skip
-    framed(figure, "", "", height=480)
-    figure.update_layout(barmode="stack", bargap=0.25, legend_traceorder="normal")
-    every = _stride(len(rows), TICKS) or 1
-    figure.update_xaxes(tickvals=places[::every], ticktext=labels[::every])
-    figure.update_xaxes(title_text="change up to this environment step", row=2, col=1)
-    figure.update_yaxes(title_text="change (reward²)", nticks=4, rangemode="tozero", row=1, col=1)
-    figure.update_yaxes(title_text="share of the change", ticksuffix=" %", range=[0, 100], row=2, col=1)
-    positive = [size for size in total if size > 0]
-    if positive and max(positive) > 50 * min(positive):
-        figure.update_yaxes(type="log", dtick=1, exponentformat="power", row=1, col=1)
-    return figure
-
-
-def discriminator_health(
-    metrics: Sequence[Mapping[str, Any]], snapshots: Sequence[object], auroc: Sequence[object]
-) -> go.Figure:
-    """Accuracy on expert and on policy steps as it trains, with AUROC on the probe at the snapshots."""
-    figure = go.Figure()
-    for name in ("expert", "policy"):
-        x, y = _thinned(*column(metrics, "env_steps", f"discriminator/accuracy_{name}"))
-        if x:
-            figure.add_scatter(x=x, y=_percent(y), name=f"accuracy on {name} steps", mode="lines")
-            figure.data[-1].line = {"color": STRATA[name], "width": 2}
-    rows = _complete_rows(snapshots, auroc)
-    if rows:
-        x, y = (list(values) for values in zip(*rows, strict=True))
-        figure.add_scatter(x=x, y=_percent(y), name="AUROC on the probe", mode="lines+markers", marker_size=6)
-        figure.data[-1].line = {"color": ACCENT, "width": 1.5, "dash": "dot"}
-    figure.update_traces(hovertemplate="%{y:.1f} %")
-    figure.add_hline(y=50, line={"color": INK, "width": 1, "dash": "dash"})
-    framed(figure, STEPS, "steps told apart")
-    figure.update_layout(hovermode="x")
-    return figure.update_yaxes(range=[0, 103], ticksuffix=" %")
-
-
 def _complete_rows(*columns: Sequence[object]) -> list[tuple[float, ...]]:
     """The rows of which every entry is a finite number."""
     rows = [tuple(finite(value) for value in row) for row in zip(*columns, strict=False)]
@@ -168,16 +110,14 @@ def _stride(n: int, most: int) -> int:
     return -(-n // most)
 
 
-def _thinned(x: list[float], y: list[float]) -> tuple[list[float], list[float]]:
+def thinned(x: list[float], y: list[float]) -> tuple[list[float], list[float]]:
+    """Every n-th point of a line, where it has more than a screen shows."""
     step = _stride(len(x), LINE_POINTS) or 1
     return x[::step], y[::step]
 
 
-def _percent(shares: list[float]) -> list[float]:
-    return [100 * share for share in shares]
-
-
-def _short(steps: float) -> str:
+def short(steps: float) -> str:
+    """Steps as a label: 51200 -> 51k."""
     for unit, letter in ((1e6, "M"), (1e3, "k")):
         if steps >= unit:
             return f"{steps / unit:.{0 if steps >= 10 * unit else 1}f}".removesuffix(".0") + letter

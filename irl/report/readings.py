@@ -30,6 +30,7 @@ def key_numbers(evaluation: Mapping[str, Any]) -> list[KeyNumber]:
         *(_reference(evaluation, name) for name in ("expert", "demonstrations", "random")),
         _correlation(evaluation, "step"),
         _correlation(evaluation, "episode"),
+        _distance(evaluation),
         _auroc(evaluation),
         _last_change(evaluation),
     ]
@@ -151,6 +152,20 @@ def _agreement(correlation: float) -> str:
         return f"{'runs' if size >= 0.4 else 'leans'} against the hand-written one"
     strength = "closely" if size >= 0.9 else "well" if size >= 0.7 else "in part" if size >= 0.4 else "weakly"
     return f"agrees {strength} with the hand-written one"
+
+
+def _distance(evaluation: Mapping[str, Any]) -> KeyNumber:
+    name, path = "Distance to the hand-written reward", "distances.headline"
+    value, low, high = (number(evaluation, f"{path}.{key}") for key in ("value", "low", "high"))
+    if value is None:
+        return _missing(evaluation, name, path)
+    shown = f"{value:.3f}" + ("" if low is None or high is None else f" ({low:.3f} to {high:.3f})")
+    ends = (("own error", "self_error"), ("a random network", "random"))
+    known = [
+        f"{words} {n:.3f}" for words, key in ends if (n := number(evaluation, f"{path}.{key}")) is not None
+    ]
+    reading = "VAL, shaping and scale forgiven: 0 is the same, 1 the opposite"
+    return KeyNumber(name, shown, "; ".join([reading, *known]) + ".")
 
 
 def _auroc(evaluation: Mapping[str, Any]) -> KeyNumber:

@@ -109,6 +109,24 @@ REUSED = {
     "exporting what is no run": Case("export datasets", ("datasets", "holds no run")),
 }
 
+GATES = {
+    f"a gate {what}": Case(f"{EVALUATE} --gate gate.toml", named, at("gate.toml", being(content)))
+    for what, content, named in (
+        ("cut off", "[bounds", ("gate.toml", "not readable TOML")),
+        ("of bytes", b"\xff\xfe", ("gate.toml", "not readable TOML")),
+        ("that is empty", "", ("states no bound", "[bounds]")),
+        ("of an unknown part", "[limits]\nscore = 1", ("no part 'limits'", "bounds, verdicts")),
+        ("of an unknown bound", "[bounds]\nfame = { min = 1 }", ("no bound 'fame'", "score")),
+        ("of an unknown verdict", "[verdicts]\nfine = true", ("no verdict 'fine'", "hacked")),
+        ("of a number", "[bounds]\nscore = 1", ("bounds.score is 1", "min = 0.5")),
+        ("of text", '[bounds]\nscore = { min = "a" }', ("bounds.score", "min = 0.5")),
+        ("of nan", "[bounds]\nscore = { min = nan }", ("bounds.score", "min = 0.5")),
+        ("turned round", "[bounds]\nscore = { min = 2, max = 1 }", ("bounds.score", "min = 0.5")),
+        ("of a verdict of a number", "[verdicts]\nhacked = 1", ("verdicts.hacked", "true or false")),
+        ("of a list", "bounds = [1]", ("bounds is [1]", "expected a table")),
+    )
+} | {"no gate": Case(f"{EVALUATE} --gate gate.toml", ("no gate file gate.toml",))}
+
 PLACES = {
     "a dataset outside the root": Case("demos show ../../x-v0", ("'../../x-v0'", "not a dataset id")),
     "a dataset with no version": Case(

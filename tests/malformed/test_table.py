@@ -19,6 +19,7 @@ PARTS = (
     commands.SHELF,
     commands.ENVIRONMENTS,
     commands.REUSED,
+    commands.GATES,
     commands.PLACES,
     imports.FILES,
     imports.CURATED,

@@ -1,0 +1,105 @@
+"""Several seeds of a retraining: each fresh, none done twice, and gathered beside the run."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from irl.core import files
+from irl.core.errors import UserError
+from irl.diagnostics.retraining import iqm
+from irl.experiment.configs import GAILRun
+from irl.experiment.retrain import Retrain, settled
+from tests.experiment.conftest import TASK
+from tests.experiment.test_retrain import PPO, equal, policies, runs, trained
+
+__all__ = ["runs", "trained"]
+
+Command = Callable[..., None]
+SHORT = [*PPO, "--steps=256", "--ppo.n-epochs=1", "--watch.eval-every=1"]
+
+
+def rows() -> list[dict]:
+    return files.read_json(Path("gail/retrained.json"))["rows"]
+
+
+@pytest.mark.usefixtures("runs")
+def test_seeds_are_gathered_and_later_ones_are_added(irl: Command, capsys: pytest.CaptureFixture) -> None:
+    irl("retrain", "gail", "--seeds", "7", "8", "--out", "again", *SHORT)
+    said = capsys.readouterr().out
+    folders = sorted(Path("again").iterdir())
+    assert [folder.name for folder in folders] == [f"retrain-gail-768-ppo-s{seed}" for seed in (7, 8)]
+    assert not equal(policies(folders[0])[0], policies(folders[1])[0])
+    assert not equal(policies("gail")[0], policies(folders[0])[0])
+    results = [files.read_json(folder / "retrain.json") for folder in folders]
+    (row,) = rows()
+    assert (row["snapshot"], row["part"], row["dynamics"]) == (768, "gail", "as trained")
+    assert row["seeds"] == [7, 8]
+    assert row["returns"] == pytest.approx([result["true"]["return_mean"] for result in results])
+    assert row["scores"] == pytest.approx([result["true"]["normalised_score"] for result in results])
+    above = [value - row["random"] for value in (iqm(np.array(row["returns"])), row["beside"])]
+    if row["ratio"]["value"] is not None:
+        assert row["ratio"]["value"] == pytest.approx(above[0] / above[1])
+        assert row["ratio"]["low"] <= row["ratio"]["value"] <= row["ratio"]["high"]
+    else:
+        assert "nothing to be a ratio to" in row["ratio_reason"]
+    assert "of seeds 7 8" in said
+    before = {path: path.stat().st_mtime_ns for path in Path("again").rglob("*")}
+    irl("retrain", "gail", "--seeds", "8", "9", "--out", "again", *SHORT)
+    (row,) = rows()
+    assert row["seeds"] == [7, 8, 9]
+    done = Path("again/retrain-gail-768-ppo-s8/retrain.json")
+    assert done.stat().st_mtime_ns == before[done]
+
+
+@pytest.mark.usefixtures("runs")
+def test_another_task_is_another_row_and_the_proxy_is_followed(irl: Command) -> None:
+    irl("retrain", "gail", "--seeds", "7", *SHORT)
+    irl("retrain", "gail", "--seeds", "7", "--env-kwargs", "cliff=1.2", *SHORT)
+    here, there = rows()
+    assert (here["dynamics"], there["dynamics"]) == ("as trained", "cliff=1.2")
+    assert there["env_id"] == f'{TASK}?{{"cliff":1.2}}'
+    # no expert is known there
+    assert there["scores"] == [None]
+    assert here["ratio"]["low"] is None
+    points = files.read_json(Path("runs/retrain-gail-768-ppo-s7/retrain.json"))["proxy_gold"]["points"]
+    assert [point["step"] for point in points] == [128, 256]
+
+
+def test_the_dynamics_are_part_of_the_tasks_name() -> None:
+    its = replace(GAILRun("Hopper-v5", seed=3).resolved(), steps=10)
+    config = settled(Retrain(Path("r"), dynamics=("gravity=0.5", "mass=2")), its, 10)
+    assert config.env_id == 'Hopper-v5?{"dynamics":{"gravity":0.5,"mass":2}}'
+    assert config.out.name.startswith("retrain-r-10-hopper-")
+    assert config.seed == 1003
+    with pytest.raises(UserError, match="seed 3 is the run's own"):
+        settled(Retrain(Path("r"), seed=3), its, 10)
+
+
+MISTAKES = {
+    "retrain gail --seeds 7 7": "names one twice",
+    "retrain gail --seeds 7 --seed 8": "leave --seed and --resume away",
+    "retrain gail --seeds 1 0": "seed 0 is the run's own",
+    "retrain gail --seeds 7 --dynamics mass=2": "no MuJoCo task",
+    "retrain gail --seeds 7 --dynamics mass": "is no argument",
+    "retrain dac --seeds 7": "not a file that irl retrain --seeds writes",
+    "retrain nan --seeds 7 --out other --steps 9": "steps was 256 and is 9",
+}
+
+
+@pytest.mark.usefixtures("runs")
+def test_a_mistake_is_one_line_and_trains_nothing(irl: Command, capsys: pytest.CaptureFixture) -> None:
+    Path("dac/retrained.json").write_text('{"format": "irl.retrained", "version": 1, "rows": [{}]}')
+    irl("retrain", "nan", "--seeds", "7", "--out", "other", *SHORT)
+    before = sorted(Path().rglob("*"))
+    for words, said in MISTAKES.items():
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stop:
+            irl(*words.split())
+        assert stop.value.code == 2
+        line = capsys.readouterr().err
+        assert said in line, line
+        assert line.count("\n") == 1
+    assert sorted(Path().rglob("*")) == before
