@@ -49,9 +49,17 @@ class Guarded(gym.Wrapper):
             obs, reward, terminated, truncated, info = self.env.step(action)
         except Exception as error:
             raise self._raised("step", error, action) from error
-        self._check(obs, f"after step {self._steps}", action)
+        self.check(obs, self._steps, action)
         self._steps += 1
         return obs, reward, terminated, truncated, info
+
+    def check(self, obs: Any, step: int, action: Any) -> None:
+        """Refuse an unusable observation after that step, the first of an episode being 0.
+
+        Raises:
+            UserError: says which number is wrong.
+        """
+        self._check(obs, f"after step {step}", action)
 
     def _check(self, obs: Any, when: str, action: Any = None) -> None:
         shape = np.shape(obs)

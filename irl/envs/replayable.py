@@ -29,8 +29,16 @@ class Replayable(gym.Wrapper):
 
     def step(self, action: np.ndarray) -> tuple[Any, Any, bool, bool, dict]:
         """One step, as the environment does it."""
-        self._actions.append(np.array(action, copy=True))
+        self.note(np.array(action, copy=True))
         return self.env.step(action)
+
+    def note(self, action: np.ndarray) -> int:
+        """Record an action that the caller takes by itself (`irl.envs.planar`); which step it is, from 1 on.
+
+        The array is kept: nobody may write to it afterwards.
+        """
+        self._actions.append(action)
+        return len(self._actions)
 
     def position(self) -> dict[str, Any]:
         """Everything `restore` needs; plain values and arrays.

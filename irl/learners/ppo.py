@@ -4,9 +4,9 @@
     r'_t = r_t / std(G) + [truncated at t] gamma V(s_{t+1})
     L    = E[min(rho A, clip(rho, 1-eps, 1+eps) A)] - c_v (V - R)^2 + c_e H
 
-Stable-Baselines3 collects and does the gradient steps. Between the two its rollout buffer is given the
-reward of a `RewardFn`, and the value of the observation that a time limit cut off is added again on that
-reward (SB3 adds it to the environment's while it collects), and the advantages are computed anew.
+The model is Stable-Baselines3's; rollouts (`ppo_collect`) and gradient steps (`ppo_update`) are its own
+within rounding, and faster. Between the two its rollout buffer is given the reward of a `RewardFn`, the value
+of the observation that a time limit cut off is added on that reward, and the advantages are computed.
 
 Differs from the paper: observations are normalised inside the policy; rewards are scaled by the running
 standard deviation of their discounted return; the exported policy may be a moving average of the weights,
@@ -14,6 +14,7 @@ w' <- c w' + (1 - c) w after each round (Polyak & Juditsky 1992 average iterates
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar, Literal
 
 from gymnasium.spaces import Box, Discrete
@@ -29,8 +30,10 @@ from irl.core.types import Metrics, RewardFn
 from irl.envs.discrete import OneHot
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
-from irl.learners.ppo_rollout import Rollouts
-from irl.learners.ppo_update import PPOUpdate, SB3Update
+from irl.learners.ppo_choices import SB3Update
+from irl.learners.ppo_collect import collect
+from irl.learners.ppo_rollout import Rollouts, by_sb3
+from irl.learners.ppo_update import PPOUpdate
 from irl.learners.random_state import read_global, write_global
 from irl.learners.vec import RecordingVecEnv
 from irl.policies.policy import Policy, PolicySpec
@@ -164,7 +167,9 @@ class PPOLearner(Rollouts):
         chosen = isinstance(self.model.action_space, Discrete)
         self._update = SB3Update(self.model) if chosen else PPOUpdate(self.model, config.activation)
         self._average = WeightAverage(_actor_weights(self.model), config.average)
-        _, self._callback = self.model._setup_learn(total_steps, callback=None)
+        _, callback = self.model._setup_learn(total_steps, callback=None)
+        gaussian = partial(collect, self.model, self.venv, config.activation)
+        self._fill = by_sb3(self.model, self.venv, callback) if chosen else gaussian
 
     @property
     def _normaliser(self) -> Normaliser:

@@ -1,6 +1,7 @@
 """A rollout of an SB3 PPO beside its gradient steps: rewards, and densities of its actions."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import torch
@@ -17,13 +18,19 @@ from irl.policies import densities
 from irl.rewards.normalise import ReturnScale
 
 
+def by_sb3(model: PPO, venv: Recorder, callback: BaseCallback) -> Callable[[], bool]:
+    """SB3's own way of collecting a rollout."""
+    return partial(model.collect_rollouts, venv, callback, model.rollout_buffer, model.n_steps)
+
+
 class Rollouts:
     """What every PPO does between its gradient steps; whoever is one sets these four, and improves."""
 
     model: PPO
     venv: Recorder
-    _callback: BaseCallback
     _scale: ReturnScale
+    _fill: Callable[[], object]
+    """Collects a rollout into the model's buffer; the environments record it."""
     _batch: Transitions | None = None
 
     @property
@@ -51,9 +58,8 @@ class Rollouts:
 
     def collect(self) -> Transitions:
         """One rollout of the current policy, time-major; actions as the environment saw them."""
-        model = self.model
-        model.collect_rollouts(self.venv, self._callback, model.rollout_buffer, model.n_steps)
-        self._batch = self.venv.take().to(model.device)
+        self._fill()
+        self._batch = self.venv.take().to(self.model.device)
         return self._batch
 
     def log_pi(self, batch: Transitions) -> Float[Tensor, "B"]:

@@ -21,7 +21,7 @@ from torch import Tensor
 from irl.core.finite import check_finite, named
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.envs.absorbing import absorb
-from irl.learners.ppo_rollout import Rollouts
+from irl.learners.ppo_rollout import Rollouts, by_sb3
 from irl.learners.vec import Recorder
 from irl.policies import densities
 from irl.policies.policy import Policy
@@ -66,6 +66,7 @@ class ReadyPPO(_Ready, Rollouts):
         super().__init__(model, steps)
         self.model = model
         self._scale = ReturnScale(model.n_envs, model.gamma)
+        self._fill = by_sb3(model, self.venv, self._callback)
 
     def improve(self, reward: RewardFn) -> Metrics:
         """Reward the last rollout in one batch and do SB3's gradient steps on it.

@@ -6,38 +6,67 @@ one step only. This wrapper writes them down, and hands on zeros for the environ
 that no code path of a learner can come to depend on it.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
+import gymnasium as gym
 import numpy as np
 import torch
 from gymnasium.spaces import Discrete
+from jaxtyping import Bool, Float
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecEnvWrapper
 
 from irl.core.types import Transitions
 from irl.envs.discrete import OneHot
 from irl.envs.make import make
+from irl.envs.planar import Planar, can_step
 from irl.envs.replayable import Replayable
+
+
+class Step(NamedTuple):
+    """One step of every environment."""
+
+    obs: Float[np.ndarray, "N O"]
+    """What the next action answers to: after an episode's end, the first of the next one."""
+    next_obs: Float[np.ndarray, "N O"]
+    """What followed, an episode's last one included."""
+    reward: Float[np.ndarray, "N"]
+    terminated: Bool[np.ndarray, "N"]
+    truncated: Bool[np.ndarray, "N"]
 
 
 class Envs(DummyVecEnv):
     """SB3's vector without its deep copy of every `info`, a quarter of the time of a Hopper step."""
 
+    def __init__(self, builders: list[Callable[[], gym.Env]]) -> None:
+        super().__init__(builders)
+        self._planar = Planar(self.envs) if can_step(self.envs) else None  # pyright: ignore[reportArgumentType]
+
+    def advance(self, actions: np.ndarray) -> Step:
+        """One step of each environment without its `info`; one that ended is reset."""
+        step = self._planar.step(actions) if self._planar else self._by_hand(actions)
+        next_obs, reward, terminated, truncated = step
+        obs, ends = next_obs, np.flatnonzero(terminated | truncated).tolist()
+        if ends:
+            obs = next_obs.copy()
+            for i in ends:
+                obs[i], self.reset_infos[i] = self.envs[i].reset()
+        return Step(obs, next_obs, reward.astype(np.float32, copy=False), terminated, truncated & ~terminated)
+
+    def _by_hand(self, actions: np.ndarray) -> tuple[np.ndarray, ...]:
+        steps = [env.step(action)[:4] for env, action in zip(self.envs, actions, strict=True)]
+        obs, reward, *ends = zip(*steps, strict=True)
+        rows = np.array(obs, dtype=self.observation_space.dtype)
+        return rows, np.array(reward, dtype=np.float32), *(np.array(end, dtype=bool) for end in ends)
+
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict]]:
-        """One step of each environment; one that ended is reset."""
-        infos = []
-        for i, env in enumerate(self.envs):
-            obs, self.buf_rews[i], terminated, truncated, given = env.step(self.actions[i])
-            info = {**given, "TimeLimit.truncated": truncated and not terminated}
-            self.buf_dones[i] = terminated or truncated
-            if self.buf_dones[i]:
-                info["terminal_observation"] = obs
-                obs, self.reset_infos[i] = env.reset()
-            self._save_obs(i, obs)
-            infos.append(info)
-        obs = self._obs_from_buf()
-        assert isinstance(obs, np.ndarray)
-        return obs, self.buf_rews.copy(), self.buf_dones.copy(), infos
+        """The same for SB3, with as much of `info` as it asks for."""
+        step = self.advance(self.actions)
+        dones = step.terminated | step.truncated
+        infos: list[dict] = [{"TimeLimit.truncated": bool(cut)} for cut in step.truncated]
+        for i in np.flatnonzero(dones).tolist():
+            infos[i]["terminal_observation"] = step.next_obs[i]
+        return step.obs, step.reward, dones, infos
 
 
 class Recorder(VecEnvWrapper):
@@ -75,10 +104,7 @@ class Recorder(VecEnvWrapper):
         for i in np.flatnonzero(dones).tolist():
             next_obs[i] = infos[i]["terminal_observation"]
             truncated[i] = infos[i].get("TimeLimit.truncated", False)
-        terminated = dones & ~truncated
-        self._steps.append((self._obs, self._actions, next_obs, terminated, truncated, rewards.copy()))
-        self._count(rewards, dones)
-        self._obs = obs
+        self._record(Step(obs, next_obs, rewards.copy(), dones & ~truncated, truncated), dones)
         return obs, np.zeros_like(rewards), dones, infos
 
     @property
@@ -107,9 +133,15 @@ class Recorder(VecEnvWrapper):
         finished, self.finished = self.finished, []
         return finished
 
-    def _count(self, rewards: np.ndarray, dones: np.ndarray) -> None:
-        self._returns += rewards
+    def _record(self, step: Step, dones: np.ndarray) -> None:
+        self._steps.append(
+            (self._obs, self._actions, step.next_obs, step.terminated, step.truncated, step.reward)
+        )
+        self._obs = step.obs
+        self._returns += step.reward
         self._lengths += 1
+        if not dones.any():
+            return
         self.finished += [(float(self._returns[i]), int(self._lengths[i])) for i in np.flatnonzero(dones)]
         self._returns[dones], self._lengths[dones] = 0.0, 0
 
@@ -128,6 +160,18 @@ class RecordingVecEnv(Recorder):
         """Reset every environment with its own seed."""
         self.venv._seeds = list(self._first_seeds)
         return super().reset()
+
+    def advance(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`step` without what it says to SB3: the observations that follow, and which episodes ended.
+
+        The array of actions is kept: nobody may write to it afterwards.
+        """
+        assert isinstance(self.venv, Envs)
+        self._actions = actions
+        step = self.venv.advance(actions)
+        dones = step.terminated | step.truncated
+        self._record(step, dones)
+        return step.obs, dones
 
     def state_dict(self) -> dict[str, Any]:
         """Where every environment is; read between two rollouts, when nothing is recorded."""

@@ -25,7 +25,7 @@ from irl.discriminators.gail import GAILConfig
 from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import OFF_POLICY, AIRLRun, DACRun, GAILRun, Imitation
-from irl.learners.ppo import PPOConfig
+from irl.learners.ppo import PPOConfig, PPOLearner
 
 SETTINGS = json.loads(Path(__file__).with_name("peer_settings.json").read_text())
 ENVS = 8
@@ -123,7 +123,7 @@ def watch(algorithm: Any, shares: dict[str, float]) -> None:
         setattr(owner, name, outer)
 
     learner, discriminator = algorithm.learner, algorithm.discriminator
-    timed(learner.venv, "step", "environment")
+    timed(learner.venv, "advance" if isinstance(learner, PPOLearner) else "step", "environment")
     for name in ("update", "reward", "logits"):
         timed(discriminator, name, "discriminator")
     # what was handed on before it was watched
