@@ -17,7 +17,7 @@ WORKERS ?= 2
 # One thread a worker: torch's own threads would only fight over the cores.
 PYTEST := OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n $(WORKERS) --dist loadfile
 
-.PHONY: help install quickstart check test test-slow clean
+.PHONY: help install quickstart check test test-slow test-browser clean
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 
@@ -41,6 +41,13 @@ test: $(STAMP)  ## the tests, except those that learn for minutes
 
 test-slow: $(STAMP)  ## the tests that learn for minutes
 	@$(PYTEST) -m slow
+
+test-browser: $(STAMP)  ## the report in a headless Chromium, which is installed where apt-get is and it is missing
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || { \
+	  echo "Installing chromium"; \
+	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium >/dev/null; } \
+	  || { echo "chromium is needed and could not be installed; install it by hand" >&2; exit 1; }
+	@OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -s -m browser tests/browser
 
 clean:  ## remove caches and builds; runs, datasets and .venv stay
 	rm -rf build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -63,11 +63,12 @@ class Page:
             f'<tr><th scope="row">{_shown(row[0])}</th>{"".join(map(_cell, row[1:]))}</tr>'
             for row in table.rows
         )
-        caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
+        caption = f'<p class="caption">{escape(table.caption)}</p>' if table.caption else ""
+        said = escape(table.caption or "table")
         return (
-            f'<div class="tabled" data-file="{name}-table-{next(self._ids)}"><div class="wide" tabindex="0" '
-            f'role="region" aria-label="{escape(table.caption or "table")}"><table>{caption}<thead><tr>{head}</tr></thead>'
-            f"<tbody>{rows}</tbody></table></div>{_take(name)}</div>"
+            f'<div class="tabled" data-file="{name}-table-{next(self._ids)}">{caption}'
+            f'<div class="wide" tabindex="0" role="region" aria-label="{said}"><table aria-label="{said}">'
+            f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{_take(name)}</div>"
         )
 
 

@@ -1,11 +1,9 @@
 from typing import Any
 
-import numpy as np
 import plotly.graph_objects as go
-import pytest
 
 from irl.report import plots
-from irl.report.palette import CHANGES, STRATA
+from irl.report.palette import STRATA
 
 
 def _traces(figure: go.Figure) -> Any:
@@ -56,28 +54,3 @@ def test_scatter_groups_by_stratum_and_is_limited() -> None:
     assert [trace.name for trace in _traces(figure)] == ["random", "held-out expert"]
     assert len(_traces(figure)[1].x) <= plots.SCATTER_POINTS
     assert float(_traces(figure)[0].y[0]) == n - 1
-
-
-def test_shares_of_a_change_add_up_and_its_total_stands_above(evaluation: dict[str, Any]) -> None:
-    changes = evaluation["drift"]["changes"]
-    figure = plots.what_moved(changes)
-    total, *shares = _traces(figure)
-    assert [trace.name for trace in shares] == list(CHANGES)
-    assert np.sum([trace.y for trace in shares], axis=0) == pytest.approx(100)
-    assert list(total.y) == [change["total"] for change in changes]
-    assert total.yaxis != shares[0].yaxis
-    assert list(_layout(figure).xaxis.ticktext)[:4] == ["2k", "4.1k", "8.2k", "16k"]
-
-
-def test_a_change_of_nothing_has_no_share() -> None:
-    still = {"from": 0, "to": 5, "offset": 0.0, "scale": 0.0, "shape": 0.0, "total": 0.0}
-    figure = plots.what_moved([still])
-    assert [trace.y[0] for trace in _traces(figure)[1:]] == [None] * 3
-
-
-def test_discriminator_health_is_in_percent_with_chance_marked() -> None:
-    rows = [{"env_steps": 1, "discriminator/accuracy_expert": 0.75}]
-    figure = plots.discriminator_health(rows, [0, 1], [0.5, None])
-    assert list(_named(figure, "accuracy on expert").y) == [75.0]
-    assert list(_named(figure, "AUROC").y) == [50.0]
-    assert _layout(figure).shapes[0].y0 == 50

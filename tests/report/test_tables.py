@@ -38,4 +38,4 @@ def test_markup_in_strings_is_not_followed(evaluation: dict[str, Any]) -> None:
 
 
 def test_an_empty_evaluation_prints_reasons() -> None:
-    assert _printed({}).count("not known") == 10
+    assert _printed({}).count("not known") == 11

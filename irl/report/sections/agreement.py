@@ -72,8 +72,8 @@ def honeycomb(rows: Mapping[str, Any], unit: str) -> go.Figure:
             line={"color": PLAY.get(name, STRATA["random"]), "width": 3, "dash": DASHES.get(name, "solid")},
             hoverinfo="skip",
         )
-    what = "of a step" if unit == "step" else "of a segment, discounted, less its value"
-    framed(drawn, f"hand-written reward {what}", f"learned reward {what} (nats)", height=470)
+    what = f"of a {unit}"
+    framed(drawn, f"hand-written, {what}", f"learned, {what} (nats)", height=470)
     return drawn.update_layout(meta={"across": rows["across"], "x": rows["x"]})
 
 

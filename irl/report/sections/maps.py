@@ -74,7 +74,7 @@ def path(places: list[list[Any]], names: list[str]) -> go.Figure:
         y=y,
         customdata=labels,
         mode="lines+markers",
-        name="snapshots, darker is later",
+        name="snapshots, stronger is later",
         line={"color": INK, "width": 1},
         marker={
             "size": 10,

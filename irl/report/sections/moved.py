@@ -53,8 +53,8 @@ def figure(
     drawn.add_hline(y=50, line={"color": INK, "width": 1, "dash": "dash"}, row=3, col=1)  # pyright: ignore[reportArgumentType]
     drawn.update_xaxes(type=axis)
     drawn.update_xaxes(title_text=STEPS, row=3, col=1)
-    drawn.update_yaxes(title_text="root mean<br>change (reward)", nticks=4, rangemode="tozero", row=1, col=1)
-    drawn.update_yaxes(title_text="share of change (%)", range=[0, 100], row=2, col=1)
+    drawn.update_yaxes(title_text="change (reward)", nticks=4, rangemode="tozero", row=1, col=1)
+    drawn.update_yaxes(title_text="share (%)", range=[0, 100], row=2, col=1)
     drawn.update_yaxes(title_text="told apart (%)", range=[0, 103], row=3, col=1)
     drawn.update_layout(hovermode="x", legend_traceorder="normal")
     return drawn
