@@ -23,7 +23,7 @@ from irl.experiment import (
     shelved,
     train,
 )
-from irl.experiment.configs import AIRLRun, AIRLSACRun, DACRun, GAILRun, GAILSACRun
+from irl.experiment.configs import AIRLRun, AIRLSACRun, BCRun, DACRun, GAILRun, GAILSACRun
 from irl.experiment.modules import import_named
 from irl.experiment.play import Interrupted
 
@@ -41,6 +41,7 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("train", "dac"): (DACRun, train.train),
     ("train", "airl"): (AIRLRun, train.train),
     ("train", "airl-sac"): (AIRLSACRun, train.train),
+    ("train", "bc"): (BCRun, train.train),
     ("train",): (train.Resume, train.go_on),
     ("probe",): (probes.Probe, probes.make_probe),
     ("evaluate",): (evaluate.Evaluate, evaluate.evaluate),
