@@ -40,7 +40,7 @@ class ImitationRun:
     """What every method that learns from demonstrations is told."""
 
     KIND: ClassVar[str] = ""
-    ADDED: ClassVar[dict[str, Any]] = {"env_kwargs": [], "demo_rate": 1}
+    ADDED: ClassVar[dict[str, Any]] = {"env_kwargs": [], "demo_rate": 1, "seeds": ""}
     env_id: str
     """Gymnasium id of the task, e.g. Hopper-v5."""
     env_kwargs: Words = ()
@@ -56,6 +56,8 @@ class ImitationRun:
     """Environment steps in all."""
     seed: int = 0
     """Seed of everything random."""
+    seeds: str = ""
+    """Several seeds instead, e.g. 0-4 or 0,3,7: a run folder each, s<seed> in `out`, and a summary."""
     out: Path | None = None
     """Run folder; runs/<method>-<task>-s<seed> unless given."""
     datasets_root: Path | None = None
@@ -70,6 +72,34 @@ class ImitationRun:
         check_at_least(self, 1, "demo_episodes", "demo_rate", "steps")
         check_threads(self.threads)
         check_seed(self.seed)
+        if self.seeds and self.seed:
+            raise ValueError(f"name one of --seed {self.seed} and --seeds {self.seeds}")
+        for seed in self.seed_numbers:
+            check_seed(seed)
+
+    @property
+    def seed_numbers(self) -> tuple[int, ...]:
+        """The seeds that `seeds` names, in order; none where it is empty.
+
+        Raises:
+            ValueError: it is not of the form 0-4 or 0,3,7, or names a seed twice.
+        """
+        numbers: list[int] = []
+        for part in filter(None, self.seeds.split(",")):
+            first, _, last = part.partition("-")
+            if not (first.isdecimal() and (last or first).isdecimal()) or int(last or first) < int(first):
+                raise ValueError(f"seeds must be like 0-4 or 0,3,7, not {self.seeds!r:.40}")
+            if int(last or first) - int(first) > 999:
+                raise ValueError(f"seeds {self.seeds!r:.40} are more than a thousand")
+            numbers += range(int(first), int(last or first) + 1)
+        if len(set(numbers)) < len(numbers) or (self.seeds and not numbers):
+            raise ValueError(f"seeds must be like 0-4 or 0,3,7, each once, not {self.seeds!r:.40}")
+        return tuple(numbers)
+
+    @property
+    def folder_of_seeds(self) -> Path:
+        """Where the folders of several seeds are."""
+        return self.out or Path("runs") / f"{self.KIND}-{task_name(full_name(self.env_id, self.env_kwargs))}"
 
     def resolved(self: Run) -> Run:
         """The same with every default that depends on another setting filled in."""

@@ -23,6 +23,7 @@ from irl.experiment import build
 from irl.experiment.configs import BCRun, ExpertRun, FromDemonstrations, Imitation, RetrainRun
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
+from irl.experiment.seeds import train_seeds
 from irl.policies.policy import save_policy
 from irl.rewards.artefact import save_reward
 from irl.rewards.learned import RewardSpec
@@ -42,7 +43,9 @@ class Resume:
 
 
 def train(config: FromDemonstrations) -> None:
-    """Train a method into a new run folder."""
+    """Train a method into a new run folder, or one for each of several seeds."""
+    if config.seeds:
+        return train_seeds(config, train, lambda path: go_on(Resume(resume=path)))
     config = config.resolved()
     build.check_device(config.device)
     demos = draw(config)

@@ -212,7 +212,9 @@ def test_the_settings_of_a_run_come_back_through_json(config: Any) -> None:
 
 def test_every_setting_that_differs_is_seen_in_the_json() -> None:
     before, after = to_json(GAIL), to_json(CHANGED)
-    assert [name for name in before if before[name] == after[name]] == ["kind"]
+    assert [name for name in before if before[name] == after[name]] == ["kind", "seeds"]
+    # of a seed and several seeds only one is named
+    assert to_json(replace(CHANGED, seed=0, seeds="1-2"))["seeds"] == "1-2"
 
 
 def test_a_run_that_contradicts_itself_is_the_users_to_mend() -> None:
