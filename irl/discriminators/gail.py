@@ -17,6 +17,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from irl.core import adam
 from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
 from irl.core.schedule import rate_at
@@ -129,7 +130,7 @@ class GAIL:
             total = total - c.entropy * losses.entropy_bonus(logits)
         self.optimizer.zero_grad(set_to_none=True)
         total.backward()
-        self.optimizer.step()
+        adam.step(self.optimizer)
         self._slopes.refresh()
         self._updates += 1
         return {"discriminator/loss": loss.item(), "discriminator/gradient_penalty": self._penalty}

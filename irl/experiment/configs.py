@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 from irl.algorithms.adversarial import ReplayedScheduleConfig, ScheduleConfig
 from irl.algorithms.bc import CloningConfig
 from irl.algorithms.interleaved import InterleavedConfig
+from irl.core import products
 from irl.core.config import check_at_least, check_seed, check_threads
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
@@ -34,7 +35,7 @@ OFF_POLICY = SACConfig(
     lr=5e-4,
     lr_schedule="linear",
     quantiles=25,
-    products="bfloat16",
+    products=products.fastest(),
     average=0.9,
 )
 """SAC beside a discriminator, or on what one left."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from irl.core import products
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 
@@ -28,7 +29,7 @@ _CHEETAH = SACConfig(
     quantiles=25,
     lr=6e-4,
     lr_schedule="linear",
-    products="bfloat16",
+    products=products.fastest(),
     average=0.98,
 )
 

@@ -16,6 +16,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
 from torch import Tensor, nn
 
+from irl.core import adam
 from irl.core.flat import linear_layers
 from irl.core.nets import Normaliser
 from irl.core.types import Metrics, Transitions
@@ -119,7 +120,7 @@ class SACUpdate:
     def _improve_temperature(self, log_pi: Float[Tensor, "B"], shares: Float[Tensor, "B"]) -> None:
         excess = log_pi + float(self.model.target_entropy)
         torch.sum(-shares * excess, 0, keepdim=True, out=self._log_temperature.grad)
-        self.optimizers[2].step()
+        adam.step(self.optimizers[2])
 
     def _next_value(
         self,
@@ -141,7 +142,7 @@ class SACUpdate:
         """What they said before."""
         said, seen = self._critics(inputs)
         self._critics.differentiate(self._head.of_loss(said, target), seen)
-        self.optimizers[1].step()
+        adam.step(self.optimizers[1])
         self._critics.refresh()
         return said
 
@@ -160,7 +161,7 @@ class SACUpdate:
         of_mean, of_log_std = gradients.of_squashed(drawn.action, drawn.moved, of_action, of_log_pi)
         of_log_std = of_log_std * _within_bounds(drawn.log_std)
         self._actor.differentiate(torch.cat([of_mean, of_log_std], 1).unsqueeze(0), seen)
-        self.optimizers[0].step()
+        adam.step(self.optimizers[0])
         self._actor.refresh()
         return self._head.value(said)
 

@@ -66,7 +66,10 @@ class Stack(Tied):
         g = (of_y @ self.weights[-2]).to(self.dtype)
         for i in range(len(activations) - 2, -1, -1):
             g = self.times_slope(g, activations[i + 1])
-            self._gradients[2 * i].copy_(g.mT @ activations[i])
+            if self.dtype == torch.float32:
+                torch.bmm(g.mT, activations[i], out=self._gradients[2 * i])
+            else:
+                self._gradients[2 * i].copy_(g.mT @ activations[i])
             torch.sum(g, 1, keepdim=True, dtype=torch.float32, out=self._gradients[2 * i + 1])
             if i:
                 g = g @ self.weights[2 * i]
