@@ -29,7 +29,7 @@ DECLARED: dict[str, tuple[str, str]] = {
     "reward/std": ("its standard deviation over the rollout", "reward"),
     "reward/scale": ("running standard deviation of its discounted return, which it is divided by", "reward"),
     "discriminator/loss": (
-        "binary cross-entropy on both classes, mean over the round; log 4 is blind",
+        "cross-entropy on both classes, or the loss that was chosen, mean over the round; log 4 is blind",
         "nats",
     ),
     "discriminator/gradient_penalty": ("penalty before its weight, mean over the round", "1"),

@@ -18,6 +18,7 @@ from irl.core.rng import episode_seeds, stream, torch_stream
 from irl.core.types import Episode, Transitions, from_episodes
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.discriminators.dac import DAC, DACConfig
+from irl.discriminators.ensemble import Ensemble, one_or_several
 from irl.discriminators.gail import GAIL
 from irl.envs.absorbing import subsample
 from irl.envs.discrete import OneHot
@@ -123,21 +124,22 @@ def _warm_start(config: Imitation, learner: PPOLearner | SACLearner, expert: Tra
 
 def _discriminator(
     config: Imitation, expert: Transitions, normaliser: Normaliser, learner: PPOLearner | SACLearner
-) -> GAIL | AIRL:
+) -> GAIL | AIRL | Ensemble:
     sizes = expert.obs.shape[1], expert.action.shape[1] or len(_actions(config.env_id).low)
-    shared = {
-        "normaliser": normaliser,
-        "init_rng": torch_stream(config.seed, "discriminator weights"),
-        "rng": torch_stream(config.seed, "discriminator", config.device),
-        "gamma": config.learner.gamma,
-    }
-    match config.discriminator:
-        case AIRLConfig() as settings:
+    settings = config.discriminator
+
+    def make(called: str) -> GAIL | AIRL:
+        shared = {
+            "normaliser": copy.deepcopy(normaliser),
+            "init_rng": torch_stream(config.seed, f"discriminator weights{called}"),
+            "rng": torch_stream(config.seed, f"discriminator{called}", config.device),
+            "gamma": config.learner.gamma,
+        }
+        if isinstance(settings, AIRLConfig):
             return AIRL(*sizes, settings, log_pi=learner.log_pi, **shared)
-        case DACConfig() as settings:
-            return DAC(*sizes, settings, **shared)
-        case settings:
-            return GAIL(*sizes, settings, **shared)
+        return (DAC if isinstance(settings, DACConfig) else GAIL)(*sizes, settings, **shared)
+
+    return one_or_several(settings, make)
 
 
 def _actions(env_id: str) -> Box:

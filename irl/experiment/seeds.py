@@ -80,8 +80,9 @@ def summary(config: FromDemonstrations, runs: Sequence[RunFolder]) -> dict[str, 
     for run, seed in zip(runs, config.seed_numbers, strict=True):
         last = run.metrics()[-1]
         value = last.get("eval_return_mean")
-        known = value is not None and card is not None
-        score = normalised_score(value, card.random_return_mean, card.measured.return_mean) if known else None
+        score = None
+        if value is not None and card is not None:
+            score = normalised_score(value, card.random_return_mean, card.measured.return_mean)
         rows.append(
             {
                 "seed": seed,

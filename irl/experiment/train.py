@@ -17,6 +17,7 @@ from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
 from irl.demos.load import Demos
 from irl.discriminators.airl import AIRL
+from irl.discriminators.ensemble import Ensemble
 from irl.discriminators.gail import GAIL
 from irl.envs.make import check_module
 from irl.experiment import build
@@ -113,7 +114,7 @@ def _policy_of(algorithm: BC) -> Callable[[Path], None]:
 def _snapshot(config: Imitation, demos: Demos, algorithm: Adversarial | Interleaved, path: Path) -> None:
     """The policy, and the reward that the round just done was rewarded by; untrained at step 0."""
     learner, discriminator = algorithm.learner, algorithm.discriminator
-    assert isinstance(discriminator, GAIL | AIRL)
+    assert isinstance(discriminator, GAIL | AIRL | Ensemble)
     save_policy(learner.policy(), path / "policy.safetensors")
     spec = RewardSpec(
         env_id=config.env_id,
