@@ -119,4 +119,7 @@ class AdversarialRun(ImitationRun):
     """What every method with a discriminator is told besides."""
 
     ADDED: ClassVar[dict[str, Any]] = ImitationRun.ADDED | {"warm_start": to_json(WarmStartConfig())}
+    ADDED |= {"preset": ""}
+    preset: str = ""
+    """Settings of a paper, over which typed ones go; irl/experiment/presets.py has each with its source."""
     warm_start: WarmStartConfig = field(default_factory=WarmStartConfig)

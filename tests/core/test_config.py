@@ -198,6 +198,7 @@ CHANGED = GAILRun(
     device="cuda",
     threads=2,
     warm_start=WarmStartConfig(updates=7),
+    preset="dac-paper",
 )
 EXPERT = ExpertRun("Hopper-v5", "expert", 10, 1, Path("runs/e"), PPO, WATCH, "cpu", 1)
 

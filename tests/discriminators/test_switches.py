@@ -84,6 +84,7 @@ def numbers(discriminator: GAIL | AIRL | Ensemble) -> list[Tensor]:
 def test_a_switch_changes_what_is_learned_and_goes_on_bit_for_bit(method: str, switch: str) -> None:
     expert, policy = batch(8, 1, shift=0.5), batch(8, 2)
     one, plain = made(method, config(method, switch)), made(method, config(method))
+    said: dict[str, float] = {}
     for _ in range(2):
         said = one.update(expert, policy)
         plain.update(expert, policy)
