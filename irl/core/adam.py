@@ -9,12 +9,15 @@ import torch
 
 
 def step(optimizer: torch.optim.Adam) -> None:
-    """One step of `optimizer` on its one parameter, the same to the bit as `optimizer.step()`.
+    """One step of `optimizer`, the same to the bit as `optimizer.step()`; fast where it has one parameter.
 
     Grouping parameters, profiler hooks and checks take torch .2 ms, the arithmetic on 150,000 weights .05.
     State and settings stay the optimiser's, so it is saved, loaded and read as ever.
     """
     group = optimizer.param_groups[0]
+    if len(group["params"]) > 1 or group.get("decoupled_weight_decay", False):
+        optimizer.step()
+        return
     (weights,) = group["params"]
     state = optimizer.state[weights]
     if not state or not group["fused"] or group["amsgrad"]:

@@ -10,7 +10,11 @@ Row = Mapping[str, int | float | None]
 
 DECLARED: dict[str, tuple[str, str]] = {
     "round": ("rounds of the loop, counted from 1", "rounds"),
-    "env_steps": ("environment steps taken so far, over all environments", "steps"),
+    "env_steps": (
+        "environment steps taken so far, over all environments; of `irl train bc`, which takes none, its "
+        "gradient steps",
+        "steps",
+    ),
     "wall_s": ("time since the run began, pauses between resumes left out", "s"),
     "checkpoint_s": ("time spent writing checkpoints since the start of the run", "s"),
     "return_mean": ("mean return of the last 20 training episodes, the environment's own reward", "reward"),
@@ -25,7 +29,7 @@ DECLARED: dict[str, tuple[str, str]] = {
     "reward/std": ("its standard deviation over the rollout", "reward"),
     "reward/scale": ("running standard deviation of its discounted return, which it is divided by", "reward"),
     "discriminator/loss": (
-        "binary cross-entropy on both classes, mean over the round; log 4 is blind",
+        "cross-entropy on both classes, or the loss that was chosen, mean over the round; log 4 is blind",
         "nats",
     ),
     "discriminator/gradient_penalty": ("penalty before its weight, mean over the round", "1"),
@@ -42,6 +46,8 @@ DECLARED: dict[str, tuple[str, str]] = {
         "nats",
     ),
     "airl/log_pi_at_bound": ("share of those densities that the bound cut, mean over the round", "1"),
+    "bc/log_pi": ("mean log density of the demonstrations' actions, mean over the round", "nats"),
+    "bc/log_pi_held_out": ("the same of demonstrations held out, at the round's end", "nats"),
     "ppo/approx_kl": ("divergence of the old policy from the new one, mean over the last pass", "nats"),
     "ppo/clip_fraction": ("share of probability ratios beyond the clip range", "1"),
     "ppo/policy_loss": ("minus the clipped surrogate, mean over the last pass", "advantage"),

@@ -80,3 +80,33 @@ def _direction(values: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
     centred = scaled - np.mean(scaled)
     centred = centred / np.max(np.abs(centred))
     return centred / np.linalg.norm(centred)
+
+
+def iqm(values: Float[np.ndarray, "N"]) -> float:
+    """Interquartile mean: the mean of what is left when a quarter is cut off at each end, whole values only.
+
+    NaN where there is none or one of them is not finite.
+
+    Source: Agarwal et al. (2021), arXiv:2108.13264.
+    """
+    if len(values) == 0 or not np.all(np.isfinite(values)):
+        return float("nan")
+    cut = len(values) // 4
+    return float(np.sort(np.asarray(values, dtype=np.float64))[cut : len(values) - cut].mean())
+
+
+def iqm_interval(
+    values: Float[np.ndarray, "N"], rng: np.random.Generator, draws: int = 2000, level: float = 0.95
+) -> tuple[float, float]:
+    """The central `level` of the interquartile means of resamples with replacement (percentile bootstrap).
+
+    NaN where there are fewer than two values or one is not finite: one run says nothing of another.
+
+    Source: Agarwal et al. (2021), arXiv:2108.13264.
+    """
+    if len(values) < 2 or not np.all(np.isfinite(values)):
+        return float("nan"), float("nan")
+    drawn = rng.integers(len(values), size=(draws, len(values)))
+    means = np.array([iqm(row) for row in np.asarray(values)[drawn]])
+    low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)

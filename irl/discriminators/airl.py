@@ -32,19 +32,24 @@ from irl.core.config import check_at_least
 from irl.core.nets import Normaliser
 from irl.core.schedule import rate_at
 from irl.core.types import Metrics, Transitions
-from irl.discriminators import losses, regularisers
+from irl.discriminators import regularisers
+from irl.discriminators.dropout import dropped
+from irl.discriminators.objectives import of_logits
+from irl.discriminators.refused import check_defined
 from irl.discriminators.shaped_slopes import ShapedSlopes, Slopes, as_rows, from_rows, joined
+from irl.discriminators.switches import SwitchesConfig, optimiser
 from irl.rewards.shaped import ShapedNet, ShapedSpec
 
 
 @dataclass(frozen=True)
-class AIRLConfig:
+class AIRLConfig(SwitchesConfig):
     """How g and h learn."""
 
-    ADDED: ClassVar[dict[str, Any]] = {"lr_schedule": "constant"}
+    ADDED: ClassVar[dict[str, Any]] = SwitchesConfig.ADDED | {"lr_schedule": "constant"}
 
-    inputs: Literal["obs", "obs_action"] = "obs_action"
-    """What g sees. `obs` is for a reward to be taken where the dynamics are others; it imitates less well."""
+    inputs: Literal["obs", "obs_action", "obs_next_obs", "obs_action_next_obs"] = "obs_action"
+    """What g sees. `obs` is for a reward to be taken where the dynamics are others; it imitates less well.
+    The last two are refused: a g that sees the next state can be any shaping itself."""
     hidden: tuple[int, ...] = (100, 100)
     """Width of each hidden layer of g."""
     potential_hidden: tuple[int, ...] = (100, 100)
@@ -72,6 +77,8 @@ class AIRLConfig:
     """Weight of the penalty that pulls the slope of h alone to 0."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        check_defined(self.loss, self.mixup, self.inputs)
         check_at_least(self, 0, "lr", "gradient_penalty", "reward_penalty", "potential_penalty")
         for name in ("absorbing_scale", "log_pi_bound"):
             if (value := getattr(self, name)) <= 0:
@@ -109,10 +116,14 @@ class AIRL:
         """
         c = self.config = config
         self.rng, self.gamma, self._log_pi = rng, gamma, log_pi
-        shape = (c.hidden, c.potential_hidden, c.activation, c.inputs, c.scale, c.log_pi_bound)
-        self.net = ShapedNet(ShapedSpec(obs_dim, action_dim, *shape), normaliser, init_rng).to(rng.device)
-        self._slopes = ShapedSlopes(self.net, gamma)
-        self.optimizer = torch.optim.Adam(self._slopes.trained, lr=c.lr, fused=True)
+        sees = "obs" if c.inputs == "obs" else "obs_action"
+        shape = (c.hidden, c.potential_hidden, c.activation, sees, c.scale, c.log_pi_bound)
+        net = self.net = ShapedNet(ShapedSpec(obs_dim, action_dim, *shape), normaliser, init_rng).to(
+            rng.device
+        )
+        of_g, of_h = dropped(c, net.reward, rng), dropped(c, net.potential, rng)
+        self._slopes = ShapedSlopes(net, gamma, (of_g, of_h) if of_g and of_h else None)
+        self.optimizer = optimiser(c, self._slopes.trained)
 
     def logits(self, batch: Transitions) -> Float[Tensor, "B"]:
         """The logit f - log pi: high where the expert is likelier."""
@@ -137,7 +148,7 @@ class AIRL:
         mixed = regularisers.between(as_rows(of_expert), as_rows(of_policy), self.rng)
         f, slopes = self._slopes(joined(of_expert, of_policy), from_rows(mixed, of_expert))
         logits = f - log_pi
-        loss = losses.bce(logits[:n], logits[n:], expert.weight, policy.weight)
+        loss = of_logits(self.config, logits[:n], logits[n:], (expert.weight, policy.weight))
         of_f, others = self._penalties(slopes)
         self.optimizer.zero_grad(set_to_none=True)
         (loss + self.config.gradient_penalty * of_f + others).backward()

@@ -19,13 +19,14 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from irl.discriminators.gail import GAIL, GAILConfig
+from irl.discriminators.switches import SwitchesConfig
 
 
 @dataclass(frozen=True)
 class DACConfig(GAILConfig):
     """How the discriminator learns: GAIL's settings with DAC's values."""
 
-    ADDED: ClassVar[dict[str, Any]] = {
+    ADDED: ClassVar[dict[str, Any]] = SwitchesConfig.ADDED | {
         "inputs": "obs_action",
         "products": "float32",
         "lr_schedule": "constant",

@@ -1,13 +1,13 @@
 """Generative adversarial imitation learning (Ho & Ermon 2016, arXiv:1606.03476).
 
-    D  <-  argmin  -E_expert[log D(s,a)] - E_policy[log(1 - D(s,a))]          (losses.bce)
+    D  <-  argmin  -E_expert[log D(s,a)] - E_policy[log(1 - D(s,a))]          (losses.bce, by objectives)
                    + c E[(|grad logit(x)| - 1)^2]                             (regularisers.slope_penalty)
     r  =   -log(1 - D(s,a))                                                   (maps.gail)
 
 Differs from the paper: the expert has label 1 (the paper has 0); the gradient penalty (the paper has
 none; Gulrajani et al. 2017); observations are normalised by the demonstrations' fixed moments; no
 causal-entropy term here, the learner has its own; the policy step is any learner that takes a RewardFn
-(the paper uses TRPO). Other rewards, penalties and the absorbing state are settings, off by default.
+(the paper uses TRPO). Other losses, rewards, penalties and the absorbing state are settings, off by default.
 """
 
 from dataclasses import dataclass
@@ -23,16 +23,19 @@ from irl.core.nets import Normaliser
 from irl.core.schedule import rate_at
 from irl.core.types import Metrics, Transitions
 from irl.discriminators import losses, regularisers
+from irl.discriminators.dropout import dropped
+from irl.discriminators.objectives import objective
 from irl.discriminators.slopes import Slopes
+from irl.discriminators.switches import SwitchesConfig, check_critic, optimiser
 from irl.rewards import tail
 from irl.rewards.nets import LogitNet, LogitSpec
 
 
 @dataclass(frozen=True)
-class GAILConfig:
+class GAILConfig(SwitchesConfig):
     """How the discriminator learns."""
 
-    ADDED: ClassVar[dict[str, Any]] = {
+    ADDED: ClassVar[dict[str, Any]] = SwitchesConfig.ADDED | {
         "reward_map": "gail",
         "activation": "tanh",
         "penalty_center": 1.0,
@@ -68,14 +71,17 @@ class GAILConfig:
     """Divide each layer by its largest singular value: the slope of the logit is then at most 1."""
     absorbing_scale: float = 0.0
     """Distance of the absorbing state from all others; 0: there is none."""
-    inputs: Literal["obs_action", "obs", "obs_next_obs"] = "obs_action"
-    """What D judges a step by. The last two learn from demonstrations without actions."""
+    inputs: Literal["obs_action", "obs", "obs_next_obs", "obs_action_next_obs"] = "obs_action"
+    """What D judges a step by. `obs` and `obs_next_obs` learn from demonstrations without actions."""
     products: Literal["float32", "bfloat16"] = "float32"
     """Number format of what hidden layers exchange while D learns. bfloat16 rounds to three digits."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_at_least(self, 0, "lr", "gradient_penalty", "penalty_center", "entropy", "absorbing_scale")
         check_at_least(self, 1, "penalty_every")
+        if self.loss == "wasserstein":
+            check_critic(self.reward_map, self.entropy, bool(self.gradient_penalty or self.spectral_norm))
 
 
 class GAIL:
@@ -101,8 +107,8 @@ class GAIL:
         spec = LogitSpec(obs_dim, action_dim, *shape, sees=config.inputs)
         self.net = LogitNet(spec, normaliser, init_rng).to(rng.device)
         dtype = torch.bfloat16 if config.products == "bfloat16" else torch.float32
-        self._slopes = Slopes(self.net, dtype)
-        self.optimizer = torch.optim.Adam(self._slopes.trained, lr=config.lr, fused=True)
+        self._slopes = Slopes(self.net, dtype, dropped(config, self.net.body, rng))
+        self.optimizer = optimiser(config, self._slopes.trained)
         self._updates, self._penalty = 0, 0.0
 
     def logits(self, batch: Transitions) -> Float[Tensor, "B"]:
@@ -116,12 +122,13 @@ class GAIL:
 
     def update(self, expert: Transitions, policy: Transitions) -> Metrics:
         """One gradient step on a batch of each. Returns the loss before it and the last penalty taken."""
-        c, n = self.config, len(expert)
+        c, weights = self.config, (expert.weight, policy.weight)
         expert_x, policy_x = self.net.inputs(expert), self.net.inputs(policy)
         penalised = c.gradient_penalty > 0 and self._updates % c.penalty_every == 0
         sloped = regularisers.between(expert_x, policy_x, self.rng) if penalised else expert_x[:0]
-        logits, slopes = self._slopes(torch.cat([expert_x, policy_x]), sloped)
-        loss = total = losses.bce(logits[:n], logits[n:], expert.weight, policy.weight)
+        rows, loss_of = objective(c, expert_x, policy_x, weights, self.rng)
+        logits, slopes = self._slopes(rows, sloped)
+        loss = total = loss_of(logits)
         if penalised:
             penalty = regularisers.slope_penalty(slopes, c.penalty_center)
             total = total + c.gradient_penalty * c.penalty_every * penalty

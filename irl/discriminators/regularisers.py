@@ -26,3 +26,19 @@ def slope_penalty(slopes: Float[Tensor, "B I"], center: float = 1.0) -> Float[Te
     arXiv:1801.04406, who take it at the data instead.
     """
     return (slopes.norm(dim=1) - center).square().mean()
+
+
+def shares(n: int, alpha: float, rng: torch.Generator) -> Float[Tensor, "N"]:
+    """N draws of Beta(alpha, alpha), alpha in (0, 1]: shares of the expert in a mixture.
+
+        x = u^(1/alpha), y = v^(1/alpha), the first pair with x + y <= 1:   x / (x + y)
+
+    by Johnk's method, in logarithms because a small alpha underflows; torch's own Beta takes no generator. At
+    alpha = 1 half of the pairs are accepted, below it more, and none of 50 once in 1e15.
+
+    Source: Zhang et al. (2018), arXiv:1710.09412, who draw the shares of mixup so.
+    """
+    u = torch.rand(2, 50, n, generator=rng, device=rng.device).clamp_(min=1e-12).log() / alpha
+    accepted = torch.logaddexp(u[0], u[1]) <= 0.0
+    first = accepted.float().argmax(0, keepdim=True)
+    return torch.sigmoid((u[0] - u[1]).gather(0, first)[0])

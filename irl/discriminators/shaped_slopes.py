@@ -8,6 +8,7 @@ from torch import Tensor
 
 from irl.core.flat import linear_layers
 from irl.core.perceptron import Perceptron
+from irl.discriminators.dropout import Dropped
 from irl.rewards.shaped import Inputs, ShapedNet, shaped
 
 
@@ -25,13 +26,22 @@ class Slopes:
 class ShapedSlopes:
     """g and h as their training sees them, by hand (`irl.core.perceptron`)."""
 
-    def __init__(self, net: ShapedNet, gamma: float) -> None:
-        """`net` is where it will stay: moving it to another device later cuts the tie."""
+    def __init__(self, net: ShapedNet, gamma: float, dropped: tuple[Dropped, Dropped] | None = None) -> None:
+        """`net` is where it will stay: moving it to another device later cuts the tie.
+
+        `dropped` evaluates g and h by autograd where units are left out.
+        """
         self._gamma, activation = gamma, net.spec.activation
-        self._g = Perceptron(linear_layers(net.reward), activation)
-        self._h = Perceptron(linear_layers(net.potential), activation)
-        self.trained = [self._g.flat, self._h.flat]
-        """What an optimiser is given."""
+        self._g: Perceptron | Dropped
+        self._h: Perceptron | Dropped
+        if dropped is not None:
+            self._g, self._h = dropped
+            self.trained = [*self._g.trained, *self._h.trained]
+            """What an optimiser is given."""
+            return
+        g = self._g = Perceptron(linear_layers(net.reward), activation)
+        h = self._h = Perceptron(linear_layers(net.potential), activation)
+        self.trained = [g.flat, h.flat]
 
     def __call__(self, x: Inputs, sloped: Inputs) -> tuple[Float[Tensor, "B"], Slopes]:
         """The f of each row of `x`, and the slopes at each row of `sloped`; differentiable by the weights."""

@@ -6,6 +6,7 @@ from torch import Tensor
 
 from irl.core.flat import linear_layers
 from irl.core.perceptron import Perceptron
+from irl.discriminators.dropout import Dropped
 from irl.rewards.nets import LogitNet
 
 
@@ -13,15 +14,17 @@ class Slopes:
     """A logit network as its training sees it.
 
     By hand (`irl.core.perceptron`), or by autograd where layers are spectrally normalised: their weights are
-    not what they multiply by.
+    not what they multiply by. Where units are dropped, `dropped` evaluates it, by autograd too.
     """
 
-    def __init__(self, net: LogitNet, dtype: torch.dtype = torch.float32) -> None:
+    def __init__(
+        self, net: LogitNet, dtype: torch.dtype = torch.float32, dropped: Dropped | None = None
+    ) -> None:
         """`net` is where it will stay: moving it to another device later cuts the tie."""
-        self._net, self._fast = net, None
+        self._net, self._fast, self._dropped = net, None, dropped
         self.trained = list(net.parameters())
         """What an optimiser is given."""
-        if not net.spec.spectral_norm:
+        if not net.spec.spectral_norm and dropped is None:
             self._fast = Perceptron(linear_layers(net.body), net.spec.activation, dtype)
             self.trained = [self._fast.flat]
 
@@ -36,6 +39,9 @@ class Slopes:
             logits, slopes = self._fast(torch.cat([x, sloped]), len(sloped))
             return logits[: len(x)], slopes
         self._net.iterate()
+        if self._dropped is not None:
+            values, at_ends = self._dropped(torch.cat([x, sloped]), len(sloped))
+            return values[: len(x)], at_ends
         return self._net.of_inputs(x), input_gradient(self._net, sloped)
 
     def refresh(self) -> None:

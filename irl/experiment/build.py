@@ -5,16 +5,20 @@ from collections.abc import Sequence
 
 import gymnasium as gym
 import torch
+from gymnasium.spaces import Box
 
 from irl.algorithms.adversarial import Adversarial
+from irl.algorithms.bc import BC, Cloning
 from irl.algorithms.forward import Forward
 from irl.algorithms.interleaved import Interleaved
 from irl.core.errors import UserError
+from irl.core.finite import check_finite, named
 from irl.core.nets import Normaliser, fitted_normaliser
 from irl.core.rng import episode_seeds, stream, torch_stream
-from irl.core.types import Episode, Transitions
+from irl.core.types import Episode, Transitions, from_episodes
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.discriminators.dac import DAC, DACConfig
+from irl.discriminators.ensemble import Ensemble, one_or_several
 from irl.discriminators.gail import GAIL
 from irl.envs.absorbing import subsample
 from irl.envs.discrete import OneHot
@@ -22,14 +26,18 @@ from irl.envs.make import make as make_env
 from irl.experiment.configs import (
     AIRLRun,
     AIRLSACRun,
+    BCRun,
     DACRun,
     ExpertRun,
+    FromDemonstrations,
     GAILSACRun,
     Imitation,
     RetrainRun,
 )
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig, SACLearner
+from irl.policies.policy import PolicySpec
+from irl.policies.trainable import fresh_policy
 from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
 
@@ -44,8 +52,10 @@ def check_device(device: str) -> None:
         raise UserError("--device cuda, but torch sees no GPU here; leave it out to train on the CPU")
 
 
-def absorbing_scale(config: Imitation) -> float:
+def absorbing_scale(config: FromDemonstrations) -> float:
     """Distance of the absorbing state that the discriminator knows; 0 where it knows none."""
+    if isinstance(config, BCRun):
+        return 0.0
     of = config.discriminator
     return of.scale if isinstance(of, AIRLConfig) else of.absorbing_scale
 
@@ -64,7 +74,7 @@ def check_learner(kind: str, env: gym.Env) -> None:
         )
 
 
-def demonstrations(config: Imitation, episodes: Sequence[Episode]) -> Transitions:
+def demonstrations(config: FromDemonstrations, episodes: Sequence[Episode]) -> Transitions:
     """The steps to learn from: thinned and led into the absorbing state where the settings say so."""
     rng = stream(config.seed, "demonstration steps")
     return subsample(episodes, config.demo_rate, rng, absorbing=absorbing_scale(config) > 0)
@@ -78,6 +88,7 @@ def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | I
     scale = absorbing_scale(config)
     # a copy for each side: both move their own to their device
     learner = _learner(config, copy.deepcopy(normaliser), scale)
+    _warm_start(config, learner, expert)
     discriminator = _discriminator(config, expert, normaliser, learner)
     rng = torch_stream(config.seed, "minibatches", config.device)
     expert = expert.to(config.device)
@@ -87,31 +98,56 @@ def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | I
     return Adversarial(learner, discriminator, expert, config.schedule, rng, absorbing=absorbing)
 
 
+def cloning(config: BCRun, episodes: Sequence[Episode], held_out: Sequence[Episode]) -> BC:
+    """A policy of random weights to be fitted to these demonstrations."""
+    expert, c = demonstrations(config, episodes), config.learner
+    box = _actions(config.env_id)
+    kind = "categorical" if isinstance(box, OneHot) else c.policy
+    spec = PolicySpec(config.env_id, expert.obs.shape[1], len(box.low), c.hidden, c.activation, kind)
+    weights = torch_stream(config.seed, "policy weights")
+    policy = fresh_policy(spec, fitted_normaliser(expert.obs), (box.low, box.high), -0.5, weights)
+    fit = Cloning(policy, expert, c, torch_stream(config.seed, "cloning", config.device))
+    return BC(fit, from_episodes(held_out) if held_out else None, c.steps_per_round)
+
+
+def _warm_start(config: Imitation, learner: PPOLearner | SACLearner, expert: Transitions) -> None:
+    """Clone the learner's policy from where it is, before anything is played."""
+    if config.warm_start.updates == 0:
+        return
+    rng = torch_stream(config.seed, "cloning", config.device)
+    fit = Cloning(learner.policy(), expert, config.warm_start, rng)
+    for _ in range(config.warm_start.updates):
+        fit.update()
+    check_finite(named("cloned policy", fit.net.state_dict()))
+    learner.adopt(fit.net.export())
+
+
 def _discriminator(
     config: Imitation, expert: Transitions, normaliser: Normaliser, learner: PPOLearner | SACLearner
-) -> GAIL | AIRL:
-    sizes = expert.obs.shape[1], expert.action.shape[1] or _action_size(config.env_id)
-    shared = {
-        "normaliser": normaliser,
-        "init_rng": torch_stream(config.seed, "discriminator weights"),
-        "rng": torch_stream(config.seed, "discriminator", config.device),
-        "gamma": config.learner.gamma,
-    }
-    match config.discriminator:
-        case AIRLConfig() as settings:
+) -> GAIL | AIRL | Ensemble:
+    sizes = expert.obs.shape[1], expert.action.shape[1] or len(_actions(config.env_id).low)
+    settings = config.discriminator
+
+    def make(called: str) -> GAIL | AIRL:
+        shared = {
+            "normaliser": copy.deepcopy(normaliser),
+            "init_rng": torch_stream(config.seed, f"discriminator weights{called}"),
+            "rng": torch_stream(config.seed, f"discriminator{called}", config.device),
+            "gamma": config.learner.gamma,
+        }
+        if isinstance(settings, AIRLConfig):
             return AIRL(*sizes, settings, log_pi=learner.log_pi, **shared)
-        case DACConfig() as settings:
-            return DAC(*sizes, settings, **shared)
-        case settings:
-            return GAIL(*sizes, settings, **shared)
+        return (DAC if isinstance(settings, DACConfig) else GAIL)(*sizes, settings, **shared)
+
+    return one_or_several(settings, make)
 
 
-def _action_size(env_id: str) -> int:
+def _actions(env_id: str) -> Box:
     env = make_env(env_id)
     env.close()
     # `make` admits flat boxes only
-    assert env.action_space.shape is not None
-    return env.action_space.shape[0]
+    assert isinstance(env.action_space, Box)
+    return env.action_space
 
 
 def forward(config: ExpertRun) -> Forward:

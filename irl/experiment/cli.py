@@ -17,6 +17,7 @@ from irl.experiment import (
     experts,
     export,
     generation,
+    glossary,
     imports,
     probes,
     reports,
@@ -25,9 +26,11 @@ from irl.experiment import (
     shelved,
     train,
 )
-from irl.experiment.configs import AIRLRun, AIRLSACRun, DACRun, GAILRun, GAILSACRun
+from irl.experiment.configs import AIRLRun, AIRLSACRun, BCRun, DACRun, GAILRun, GAILSACRun
+from irl.experiment.imitation_run import AdversarialRun
 from irl.experiment.modules import import_named
 from irl.experiment.play import Interrupted
+from irl.experiment.presets import with_preset
 
 Run = Callable[[Any], None]
 
@@ -43,9 +46,11 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("train", "dac"): (DACRun, train.train),
     ("train", "airl"): (AIRLRun, train.train),
     ("train", "airl-sac"): (AIRLSACRun, train.train),
+    ("train", "bc"): (BCRun, train.train),
     ("train",): (train.Resume, train.go_on),
     ("probe",): (probes.Probe, probes.make_probe),
     ("evaluate",): (evaluate.Evaluate, evaluate.evaluate),
+    ("metrics",): (glossary.Glossary, glossary.glossary),
     ("report",): (reports.Report, reports.report),
     ("retrain",): (retrain.Retrain, reseeded.retrain),
     ("export",): (export.Export, export.export),
@@ -81,17 +86,36 @@ def _dispatch(words: list[str]) -> None:
     for n in (2, 1):
         if (name := tuple(words[:n])) in COMMANDS and len(name) == n:
             cls, run = COMMANDS[name]
-            run(_parsed(cls, words[n:], f"irl {' '.join(name)}"))
+            run(_parsed(cls, words[n:], f"irl {' '.join(name)}", _default(cls, words[n:])))
             return
     _overview(words)
 
 
-def _parsed(cls: type, words: list[str], program: str) -> Any:
+def _default(cls: type, words: list[str]) -> Any:
+    """The settings that typed ones go over where a preset is named; None where none is."""
+    if not issubclass(cls, AdversarialRun) or (name := _typed(words, "--preset")) is None:
+        return None
+    # without a task the words are refused in any case
+    env_id = _typed([word.replace("--env_id", "--env-id") for word in words], "--env-id")
+    return with_preset(cls(env_id=env_id), name) if env_id else None
+
+
+def _typed(words: list[str], flag: str) -> str | None:
+    """What follows a flag, the last time that it is typed."""
+    found = None
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        name, given, value = word.partition("=")
+        if name == flag:
+            found = value if given else following
+    return found
+
+
+def _parsed(cls: type, words: list[str], program: str, default: Any = None) -> Any:
     """The command that the words say; tyro's boxed complaint as one line."""
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            return tyro.cli(cls, args=words, prog=program)
+            return tyro.cli(cls, args=words, prog=program, **({"default": default} if default else {}))
     except SystemExit as stop:
         if stop.code in (0, None):
             raise

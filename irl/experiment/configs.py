@@ -1,98 +1,24 @@
 """Every training command as one frozen dataclass: the command line and `config.json` are made from these."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeVar
-
-import tyro
+from typing import ClassVar, Literal
 
 from irl.algorithms.adversarial import ReplayedScheduleConfig, ScheduleConfig
+from irl.algorithms.bc import CloningConfig
 from irl.algorithms.interleaved import InterleavedConfig
 from irl.core import products
 from irl.core.config import check_at_least, check_seed, check_threads
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
-from irl.envs.names import full_name
-from irl.envs.tasks import task_name
+from irl.experiment.imitation_run import AdversarialRun, ImitationRun, Watch
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 
-Run = TypeVar("Run", bound="ImitationRun")
-Words = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE ...")]
-Keys = Annotated[tuple[str, ...], tyro.conf.arg(metavar="KEY ...")]
-
 
 @dataclass(frozen=True)
-class Watch:
-    """What is written down while it trains; none of it changes a weight."""
-
-    eval_every: int = 10
-    """Rounds between two evaluations of the deterministic policy; 0 evaluates at the end only."""
-    eval_episodes: int = 5
-    """Episodes of one such evaluation."""
-    checkpoint_every_s: float = 120.0
-    """Seconds between two checkpoints."""
-    tensorboard: bool = True
-    """Write curves for TensorBoard into the run folder."""
-    progress: bool = True
-    """Show a progress bar, or a line now and then where there is no terminal."""
-
-    def __post_init__(self) -> None:
-        check_at_least(self, 0, "eval_every", "eval_episodes", "checkpoint_every_s")
-
-
-@dataclass(frozen=True)
-class ImitationRun:
-    """What every method that learns from demonstrations is told."""
-
-    KIND: ClassVar[str] = ""
-    ADDED: ClassVar[dict[str, Any]] = {"env_kwargs": [], "demo_rate": 1}
-    env_id: str
-    """Gymnasium id of the task, e.g. Hopper-v5."""
-    env_kwargs: Words = ()
-    """What the environment is given, name=value or a JSON object; becomes part of env_id."""
-    demos: str = ""
-    """Minari dataset of demonstrations; irl/<task>/expert-v0 unless given."""
-    demo_episodes: int = 4
-    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
-    demo_rate: int = 1
-    """Keep every so-manieth step of them, from an offset drawn for each; with an absorbing state, all of its
-    steps stay, at the weight of one."""
-    steps: int = 245_760
-    """Environment steps in all."""
-    seed: int = 0
-    """Seed of everything random."""
-    out: Path | None = None
-    """Run folder; runs/<method>-<task>-s<seed> unless given."""
-    datasets_root: Path | None = None
-    """Folder of Minari datasets; MINARI_DATASETS_PATH, or expert_data/datasets, unless given."""
-    watch: Watch = field(default_factory=Watch)
-    device: Literal["cpu", "cuda"] = "cpu"
-    """Where the networks live. MuJoCo runs on the CPU, and networks this small are fastest there too."""
-    threads: int = 1
-    """Threads of torch's operators; results are the same to the bit only at the same number."""
-
-    def __post_init__(self) -> None:
-        check_at_least(self, 1, "demo_episodes", "demo_rate", "steps")
-        check_threads(self.threads)
-        check_seed(self.seed)
-
-    def resolved(self: Run) -> Run:
-        """The same with every default that depends on another setting filled in."""
-        env_id = full_name(self.env_id, self.env_kwargs)
-        task = task_name(env_id)
-        return replace(
-            self,
-            env_id=env_id,
-            env_kwargs=(),
-            demos=self.demos or f"irl/{task}/expert-v0",
-            out=self.out or Path("runs") / f"{self.KIND}-{task}-s{self.seed}",
-        )
-
-
-@dataclass(frozen=True)
-class GAILRun(ImitationRun):
+class GAILRun(AdversarialRun):
     """Generative adversarial imitation learning with PPO."""
 
     KIND: ClassVar[str] = "gail"
@@ -116,7 +42,7 @@ OFF_POLICY = SACConfig(
 
 
 @dataclass(frozen=True)
-class GAILSACRun(ImitationRun):
+class GAILSACRun(AdversarialRun):
     """Generative adversarial imitation learning with SAC, on the steps of its whole memory."""
 
     KIND: ClassVar[str] = "gail-sac"
@@ -130,7 +56,7 @@ class GAILSACRun(ImitationRun):
 
 
 @dataclass(frozen=True)
-class DACRun(ImitationRun):
+class DACRun(AdversarialRun):
     """Discriminator-actor-critic: SAC, the logit as reward, and terminations led into an absorbing state."""
 
     KIND: ClassVar[str] = "dac"
@@ -144,7 +70,7 @@ class DACRun(ImitationRun):
 
 
 @dataclass(frozen=True)
-class AIRLRun(ImitationRun):
+class AIRLRun(AdversarialRun):
     """Adversarial inverse reinforcement learning with PPO: a reward that can be taken elsewhere."""
 
     KIND: ClassVar[str] = "airl"
@@ -166,7 +92,7 @@ class AIRLRun(ImitationRun):
 
 
 @dataclass(frozen=True)
-class AIRLSACRun(ImitationRun):
+class AIRLSACRun(AdversarialRun):
     """Adversarial inverse reinforcement learning with SAC, on the steps of its whole memory."""
 
     KIND: ClassVar[str] = "airl-sac"
@@ -187,8 +113,42 @@ class AIRLSACRun(ImitationRun):
             )
 
 
+@dataclass(frozen=True)
+class ClonedConfig(CloningConfig):
+    """What kind of policy is fitted, and how."""
+
+    KIND: ClassVar[str] = "bc"
+    policy: Literal["gaussian", "squashed_gaussian"] = "gaussian"
+    """How real-valued actions are drawn: as PPO's, clipped to their bounds, or squashed into them."""
+    hidden: tuple[int, ...] = (256, 256)
+    """Width of each hidden layer."""
+    activation: Literal["tanh", "relu"] = "relu"
+    """Between the layers."""
+    steps_per_round: int = 1000
+    """Gradient steps between two reports."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_at_least(self, 1, "steps_per_round")
+
+
+@dataclass(frozen=True)
+class BCRun(ImitationRun):
+    """Behavioural cloning: a policy from demonstrations, without a reward and without an environment."""
+
+    KIND: ClassVar[str] = "bc"
+    demo_episodes: int = 5
+    """How many of its episodes to learn from; the rest is held out."""
+    steps: int = 20_000
+    """Gradient steps in all."""
+    learner: ClonedConfig = field(default_factory=ClonedConfig)
+
+
 Imitation = GAILRun | GAILSACRun | DACRun | AIRLRun | AIRLSACRun
-"""Every method there is, by its `KIND`."""
+"""Every method that learns a reward, by its `KIND`."""
+
+FromDemonstrations = Imitation | BCRun
+"""Every method that learns from demonstrations."""
 
 
 @dataclass(frozen=True)

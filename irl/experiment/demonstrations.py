@@ -10,7 +10,7 @@ from irl.core.errors import UserError
 from irl.demos.info import show, table
 from irl.demos.root import datasets_root
 from irl.demos.storage import list_datasets
-from irl.experiment.configs import Keys
+from irl.experiment.imitation_run import Keys
 
 
 @dataclass(frozen=True)

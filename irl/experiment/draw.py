@@ -14,13 +14,13 @@ from irl.envs.flatten import OBS_KEYS
 from irl.envs.make import check_module, make
 from irl.envs.names import split_name
 from irl.experiment.build import check_learner
-from irl.experiment.configs import Imitation
+from irl.experiment.configs import BCRun, FromDemonstrations
 from irl.experiment.judge import finite
 
 RECORD = "demonstrations.json"
 
 
-def draw(config: Imitation) -> Demos:
+def draw(config: FromDemonstrations) -> Demos:
     """The demonstrations that the settings name.
 
     Raises:
@@ -29,15 +29,13 @@ def draw(config: Imitation) -> Demos:
     return _drawn_of(config, config.datasets_root)
 
 
-def _drawn_of(config: Imitation, root: Path | None) -> Demos:
+def _drawn_of(config: FromDemonstrations, root: Path | None) -> Demos:
     """The demonstrations, once they are known to be of the task and the task is known to start."""
     env = make(config.env_id)
     try:
         demos = _loaded(config, root)
         check_learner(config.learner.KIND, env)
-        of = config.discriminator
-        # AIRL takes the density of the actions off, whatever g sees
-        check_task(demos, env, seen=of.inputs == "obs_action" or isinstance(of, AIRLConfig))
+        check_task(demos, env, seen=_sees_actions(config))
         env.reset(seed=config.seed)
         box = env.action_space
         assert isinstance(box, Box)
@@ -48,7 +46,15 @@ def _drawn_of(config: Imitation, root: Path | None) -> Demos:
         env.close()
 
 
-def _loaded(config: Imitation, root: Path | None) -> Demos:
+def _sees_actions(config: FromDemonstrations) -> bool:
+    """Whether it learns from the actions of the demonstrations, and not from their states alone."""
+    if isinstance(config, BCRun) or config.warm_start.updates:
+        return True
+    # AIRL takes the density of the actions off, whatever g sees
+    return "action" in config.discriminator.inputs or isinstance(config.discriminator, AIRLConfig)
+
+
+def _loaded(config: FromDemonstrations, root: Path | None) -> Demos:
     given = {"episodes": config.demo_episodes, "seed": config.seed, "root": root}
     try:
         return load_demos(config.demos, **given)
@@ -72,7 +78,7 @@ def drawn(demos: Demos) -> dict[str, Any]:
     }
 
 
-def drawn_again(config: Imitation, folder: RunFolder, root: Path | None = None) -> Demos:
+def drawn_again(config: FromDemonstrations, folder: RunFolder, root: Path | None = None) -> Demos:
     """The demonstrations that the run in `folder` was begun with.
 
     Raises:

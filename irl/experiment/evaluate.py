@@ -21,7 +21,8 @@ from irl.core.rng import episode_seeds
 from irl.core.types import Episode
 from irl.envs.make import make
 from irl.envs.rollouts import rollouts
-from irl.experiment.configs import Imitation
+from irl.experiment.cloned import evaluation_of_cloned
+from irl.experiment.configs import BCRun, FromDemonstrations
 from irl.experiment.draw import drawn_again
 from irl.experiment.filmed import record
 from irl.experiment.gate import broken, read_gate
@@ -98,7 +99,7 @@ def evaluate(command: Evaluate) -> None:
 
 def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     """The content of `evaluation.json`."""
-    config = from_json(Imitation, folder.config, str(folder.path / "config.json"))
+    config = from_json(FromDemonstrations, folder.config, str(folder.path / "config.json"))
     if not (snapshots := folder.snapshots()):
         raise UserError(
             f"{folder.path} has no snapshot; go on with: irl train --resume {folder.path}, or where it is "
@@ -108,6 +109,9 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     root = command.datasets_root or config.datasets_root
     demos = drawn_again(config, folder, root)
     references = references_of(config.env_id, demos, command.policies_root)
+    if isinstance(config, BCRun):
+        measure = lambda policy: _policy(_play(config.env_id, policy, command), references)  # noqa: E731
+        return evaluation_of_cloned(folder, config, references, measure)
     # everything is read before anything is played
     policies, rewards = _read(config.env_id, snapshots)
     policy = policies[max(policies)]

@@ -17,7 +17,8 @@ from irl.envs.make import check_module, make
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
-from irl.experiment.configs import ExpertRun, Watch, Words
+from irl.experiment.configs import ExpertRun
+from irl.experiment.imitation_run import Watch, Words
 from irl.experiment.play import MAY_CHANGE, Player
 from irl.experiment.recipes import recipe
 from irl.experiment.shelved import EPISODES, Row, measured_of, shelf_table

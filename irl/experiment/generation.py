@@ -21,7 +21,7 @@ from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.experiment import actors
 from irl.experiment.actors import Actor
-from irl.experiment.configs import Words
+from irl.experiment.imitation_run import Words
 from irl.experiment.progress import each_episode, progress
 from irl.experiment.shelved import cores
 from irl.policies import shelf

@@ -17,6 +17,7 @@ from irl.core.nets import fitted_normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Episode, Transitions, from_episodes
 from irl.discriminators.airl import AIRL, AIRLConfig
+from irl.discriminators.ensemble import Ensemble, one_or_several
 from irl.discriminators.gail import GAIL, GAILConfig
 from irl.envs.absorbing import absorb
 from irl.learners.ready import ReadyPPO, ReadySAC, ready
@@ -110,23 +111,27 @@ def _check(model: Any, expert: Transitions, method: str, settings: GAILConfig | 
 
 def _discriminator(
     learner: ReadyPPO | ReadySAC, expert: Transitions, settings: GAILConfig | AIRLConfig, seed: int
-) -> GAIL | AIRL:
+) -> GAIL | AIRL | Ensemble:
     model = learner.model
     sizes = expert.obs.shape[1], expert.action.shape[1]
-    shared = {
-        "normaliser": fitted_normaliser(expert.obs),
-        "init_rng": torch_stream(seed, "discriminator weights"),
-        "rng": torch_stream(seed, "discriminator", model.device),
-        "gamma": model.gamma,
-    }
-    if isinstance(settings, AIRLConfig):
-        return AIRL(*sizes, settings, log_pi=learner.log_pi, **shared)
-    return GAIL(*sizes, settings, **shared)
+
+    def make(called: str) -> GAIL | AIRL:
+        shared = {
+            "normaliser": fitted_normaliser(expert.obs),
+            "init_rng": torch_stream(seed, f"discriminator weights{called}"),
+            "rng": torch_stream(seed, f"discriminator{called}", model.device),
+            "gamma": model.gamma,
+        }
+        if isinstance(settings, AIRLConfig):
+            return AIRL(*sizes, settings, log_pi=learner.log_pi, **shared)
+        return GAIL(*sizes, settings, **shared)
+
+    return one_or_several(settings, make)
 
 
 def _algorithm(
     learner: ReadyPPO | ReadySAC,
-    judge: GAIL | AIRL,
+    judge: GAIL | AIRL | Ensemble,
     expert: Transitions,
     schedule: Schedule | None,
     rng: Any,
@@ -137,13 +142,17 @@ def _algorithm(
         if not isinstance(chosen, InterleavedConfig):
             raise ValueError(f"SAC's schedule is an InterleavedConfig, not a {type(chosen).__name__}")
         return Interleaved(learner, judge, expert, chosen, rng)
-    chosen = schedule or (ReplayedScheduleConfig() if isinstance(judge, AIRL) else ScheduleConfig())
+    chosen = schedule or (
+        ReplayedScheduleConfig() if isinstance(judge.config, AIRLConfig) else ScheduleConfig()
+    )
     if not isinstance(chosen, ScheduleConfig):
         raise ValueError(f"PPO's schedule is a ScheduleConfig, not a {type(chosen).__name__}")
     return Adversarial(learner, judge, expert, chosen, rng, absorbing=absorbing)
 
 
-def _reward(learner: ReadyPPO | ReadySAC, judge: GAIL | AIRL, method: str, seed: int) -> LearnedReward:
+def _reward(
+    learner: ReadyPPO | ReadySAC, judge: GAIL | AIRL | Ensemble, method: str, seed: int
+) -> LearnedReward:
     found = learner.venv.get_attr("spec")[0]
     spec = RewardSpec(
         env_id=found.id if found is not None else "",

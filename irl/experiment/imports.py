@@ -16,7 +16,7 @@ from irl.demos.importers import import_file
 from irl.demos.info import table
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
-from irl.experiment.configs import Keys, Words
+from irl.experiment.imitation_run import Keys, Words
 from irl.experiment.judge import finite
 from irl.policies.card import measure_random
 

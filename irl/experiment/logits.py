@@ -14,8 +14,9 @@ from irl.core.nets import Normaliser
 from irl.core.types import Transitions
 from irl.policies.density import Density
 from irl.policies.policy import Policy
+from irl.rewards.ensemble import EnsembleSpec
 from irl.rewards.learned import LearnedReward
-from irl.rewards.nets import LogitNet
+from irl.rewards.nets import LogitSpec
 from irl.rewards.shaped import ShapedNet
 
 
@@ -31,22 +32,23 @@ class Snapshot:
 
         A termination is judged as the discriminator saw it: as a step into s_abs where there is one.
         """
-        given, net = self.reward.logits(batch), self.reward.net
-        if isinstance(net, LogitNet):
+        given, spec = self.reward.logits(batch), self.reward.net.spec
+        of_one = spec.of if isinstance(spec, EnsembleSpec) else spec
+        if isinstance(of_one, LogitSpec):
             return given
-        bound = net.spec.log_pi_bound
+        bound = of_one.log_pi_bound
         return given - Density(self.policy)(batch).clamp(-bound, bound)
 
     @property
     def parts(self) -> dict[str, "Part"]:
-        """What the reward is made of, by name: `logit`, and of AIRL's also `f`, `g` and `h`."""
+        """What the reward is made of, by name: `logit`, and of a single AIRL's also `f`, `g` and `h`."""
         named = ("logit", "f", "g", "h") if isinstance(self.reward.net, ShapedNet) else ("logit",)
         return {name: Part(self, name) for name in named}
 
     def normalised_by(self, normaliser: Normaliser) -> "Snapshot":
         """The same networks seeing observations through another normaliser."""
         net = self.reward.net
-        kept = {name: value for name, value in net.state_dict().items() if not name.startswith("normaliser.")}
+        kept = {name: value for name, value in net.state_dict().items() if "normaliser." not in name}
         other = type(net)(net.spec, normaliser, torch.Generator())  # pyright: ignore[reportArgumentType]
         other.load_state_dict({**other.state_dict(), **kept})
         return replace(self, reward=LearnedReward(self.reward.spec, other))

@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from irl.algorithms.loop import Learner, Round
+from irl.algorithms.loop import Round
 from irl.algorithms.probe import read_episodes
 from irl.core.differences import differences, without
 from irl.core.errors import UserError
@@ -26,9 +26,10 @@ from irl.core.records import RunFolder, snapshot_steps
 from irl.core.rng import episode_seeds
 from irl.core.types import Metrics, RewardFn
 from irl.envs.rollouts import rollouts
-from irl.experiment.configs import Watch
 from irl.experiment.curves import curves
+from irl.experiment.imitation_run import Watch
 from irl.experiment.progress import progress, training_words
+from irl.policies.policy import Policy
 
 MOST_CHECKPOINTING = 0.02
 """Share of the time that checkpoints may take."""
@@ -41,11 +42,22 @@ RECENT = 20
 
 
 @runtime_checkable
+class Watched(Protocol):
+    """What a run folder wants to know of a learner, or of anything that a policy comes from."""
+
+    @property
+    def env_steps(self) -> int: ...
+    def take_finished(self) -> list[tuple[float, int]]: ...
+    def policy(self) -> Policy: ...
+    def close(self) -> None: ...
+
+
+@runtime_checkable
 class Algorithm(Protocol):
     """What can be played."""
 
-    learner: Learner
-
+    @property
+    def learner(self) -> Watched: ...
     @property
     def index(self) -> int: ...
     def rounds(self, steps: int) -> Iterator[Round]: ...

@@ -17,7 +17,8 @@ from irl.core.types import Episode
 from irl.envs.make import check_module, make
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
-from irl.experiment.configs import Imitation, Words
+from irl.experiment.configs import FromDemonstrations
+from irl.experiment.imitation_run import Words
 from irl.experiment.progress import each_step, progress
 from irl.policies import shelf
 from irl.policies.policy import Policy, check_policy, load_policy
@@ -128,7 +129,7 @@ def _task(command: Probe, folder: records.RunFolder | None) -> str:
             raise UserError("no task is named; give --env-id, e.g. --env-id Hopper-v5, or a run folder")
         return full_name(command.env_id, command.env_kwargs)
     where = str(folder.path / "config.json")
-    env_id = from_json(Imitation, folder.config, where).env_id
+    env_id = from_json(FromDemonstrations, folder.config, where).env_id
     check_module(env_id, where)
     if command.env_id is not None and full_name(command.env_id, command.env_kwargs) != env_id:
         raise UserError(f"{folder.path} is a run of {env_id}; leave --env-id out")

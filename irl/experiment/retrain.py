@@ -23,8 +23,9 @@ from irl.envs.make import check_module
 from irl.envs.names import full_name, split_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
-from irl.experiment.configs import OFF_POLICY, Imitation, RetrainRun, Watch, Words
+from irl.experiment.configs import OFF_POLICY, BCRun, Imitation, RetrainRun
 from irl.experiment.frozen import RECORD, frozen, frozen_again, recorded
+from irl.experiment.imitation_run import Watch, Words
 from irl.experiment.play import Player
 from irl.experiment.retrained import report
 from irl.experiment.snapshots import snapshot_of
@@ -118,6 +119,8 @@ def _begun(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:
     """A new run folder; nothing is written before everything is read and the task is known to start."""
     assert command.run is not None
     source = records.open_run(command.run)
+    if source.config.get("kind") == BCRun.KIND:
+        raise UserError(f"{source.path} is of behavioural cloning, which learns no reward to retrain on")
     its = from_json(Imitation, source.config, str(source.path / "config.json"))
     check_module(its.env_id, str(source.path / "config.json"))
     build.check_device(command.device)

@@ -1,12 +1,15 @@
 """`irl train`: learn a policy and a reward from demonstrations."""
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import torch
 
 from irl.algorithms.adversarial import Adversarial
+from irl.algorithms.bc import BC
 from irl.algorithms.interleaved import Interleaved
 from irl.core import files, records
 from irl.core.config import from_json, to_json
@@ -14,12 +17,14 @@ from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
 from irl.demos.load import Demos
 from irl.discriminators.airl import AIRL
+from irl.discriminators.ensemble import Ensemble
 from irl.discriminators.gail import GAIL
 from irl.envs.make import check_module
 from irl.experiment import build
-from irl.experiment.configs import ExpertRun, Imitation, RetrainRun
+from irl.experiment.configs import BCRun, ExpertRun, FromDemonstrations, Imitation, RetrainRun
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
+from irl.experiment.seeds import train_seeds
 from irl.policies.policy import save_policy
 from irl.rewards.artefact import save_reward
 from irl.rewards.learned import RewardSpec
@@ -38,8 +43,10 @@ class Resume:
     """Where the repeated run goes; needed with --config."""
 
 
-def train(config: Imitation) -> None:
-    """Train a method into a new run folder."""
+def train(config: FromDemonstrations) -> None:
+    """Train a method into a new run folder, or one for each of several seeds."""
+    if config.seeds:
+        return train_seeds(config, train, lambda path: go_on(Resume(resume=path)))
     config = config.resolved()
     build.check_device(config.device)
     demos = draw(config)
@@ -59,7 +66,7 @@ def go_on(command: Resume) -> None:
     if command.config is not None:
         if command.out is None:
             raise UserError("--config repeats a run in a new folder: name it with --out FOLDER")
-        config = from_json(Imitation, files.read_json(command.config), str(command.config))
+        config = from_json(FromDemonstrations, files.read_json(command.config), str(command.config))
         check_module(config.env_id, str(command.config))
         return train(replace(config, out=command.out))
     assert command.resume is not None
@@ -73,15 +80,20 @@ def go_on(command: Resume) -> None:
             raise UserError(
                 f"{folder.path} is a run of kind {kind!r}; go on with: {command_of} --resume {folder.path}"
             )
-    config = from_json(Imitation, folder.config, str(folder.path / "config.json"))
+    config = from_json(FromDemonstrations, folder.config, str(folder.path / "config.json"))
     demos = drawn_again(config, folder)
     torch.set_num_threads(config.threads)
     return play(config, demos, folder)
 
 
-def play(config: Imitation, demos: Demos, folder: records.RunFolder) -> None:
+def play(config: FromDemonstrations, demos: Demos, folder: records.RunFolder) -> None:
     """Train into `folder`, from its last checkpoint where it has one."""
-    algorithm = build.imitation(config, demos.episodes)
+    if isinstance(config, BCRun):
+        algorithm = build.cloning(config, demos.episodes, demos.held_out)
+        snapshot = _policy_of(algorithm)
+    else:
+        algorithm = build.imitation(config, demos.episodes)
+        snapshot = partial(_snapshot, config, demos, algorithm)
     player = Player(
         algorithm,
         folder,
@@ -89,16 +101,20 @@ def play(config: Imitation, demos: Demos, folder: records.RunFolder) -> None:
         env_id=config.env_id,
         steps=config.steps,
         seed=config.seed,
-        snapshot=lambda path: _snapshot(config, demos, algorithm, path),
+        snapshot=snapshot,
     )
     player.run(to_go_on=f"irl train --resume {folder.path}")
     print(f"trained; judge it with: irl evaluate {folder.path}", file=sys.stderr)
 
 
+def _policy_of(algorithm: BC) -> Callable[[Path], None]:
+    return lambda path: save_policy(algorithm.policy(), path / "policy.safetensors")
+
+
 def _snapshot(config: Imitation, demos: Demos, algorithm: Adversarial | Interleaved, path: Path) -> None:
     """The policy, and the reward that the round just done was rewarded by; untrained at step 0."""
     learner, discriminator = algorithm.learner, algorithm.discriminator
-    assert isinstance(discriminator, GAIL | AIRL)
+    assert isinstance(discriminator, GAIL | AIRL | Ensemble)
     save_policy(learner.policy(), path / "policy.safetensors")
     spec = RewardSpec(
         env_id=config.env_id,

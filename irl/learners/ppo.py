@@ -28,6 +28,7 @@ from irl.core.nets import ACTIVATIONS, Normaliser
 from irl.core.schedule import learning_rate
 from irl.core.types import Metrics, RewardFn
 from irl.envs.discrete import OneHot
+from irl.learners.adopting import adopt
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures
 from irl.learners.ppo_choices import SB3Update
@@ -215,6 +216,15 @@ class PPOLearner(Rollouts):
         spec = PolicySpec(self.env_id, *sizes, self.config.hidden, self.config.activation, kind)
         return Policy(spec, weights)
 
+    def adopt(self, policy: Policy) -> None:
+        """Act as `policy` does from now on.
+
+        Raises:
+            ValueError: its layers are of other sizes.
+        """
+        adopt(_acting(self.model), policy)
+        self._average = WeightAverage(_actor_weights(self.model), self.config.average)
+
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on, between two rounds."""
         model = self.model
@@ -250,6 +260,10 @@ class PPOLearner(Rollouts):
 
 
 def _actor_weights(model: PPO) -> dict[str, Tensor]:
+    return {name: weight.cpu() for name, weight in _acting(model).items()}
+
+
+def _acting(model: PPO) -> dict[str, Tensor]:
     """The weights that make the policy act, under the names that `Policy` has for them."""
     net = model.policy
     layers = [m for m in net.mlp_extractor.policy_net if isinstance(m, nn.Linear)]
@@ -257,4 +271,4 @@ def _actor_weights(model: PPO) -> dict[str, Tensor]:
     weights: dict[str, Tensor] = {"log_std": net.log_std} if isinstance(model.action_space, Box) else {}
     for i, layer in enumerate([*layers, net.action_net]):
         weights |= {f"layers.{i}.weight": layer.weight, f"layers.{i}.bias": layer.bias}
-    return {name: weight.detach().cpu() for name, weight in weights.items()}
+    return {name: weight.detach() for name, weight in weights.items()}

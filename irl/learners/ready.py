@@ -204,7 +204,16 @@ def ready(model: BaseAlgorithm, steps: int, *, absorbing: bool = False) -> Ready
         return ReadyPPO(model, steps)
     if type(model) is SAC:
         return ReadySAC(model, steps, absorbing=absorbing)
-    raise ValueError(f"expected a PPO or SAC of stable_baselines3, not {type(model).__name__}")
+    if (
+        "Recurrent" in (name := type(model).__name__)
+        or "Recurrent" in type(getattr(model, "policy", None)).__name__
+    ):
+        raise ValueError(
+            f"{name} remembers what it saw, and a reward is learned of single steps, whose density and value "
+            f"would be without their past; use a PPO or SAC with an MlpPolicy, and put what must be "
+            f"remembered into the observation (gymnasium.wrappers.FrameStackObservation, flattened)"
+        )
+    raise ValueError(f"expected a PPO or SAC of stable_baselines3, not {name}")
 
 
 def check_model(model: BaseAlgorithm) -> None:

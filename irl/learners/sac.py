@@ -36,6 +36,7 @@ from irl.core.nets import CLIP, NO_CLIP, Normaliser, linear
 from irl.core.rng import torch_stream
 from irl.core.schedule import learning_rate
 from irl.core.types import Metrics, RewardFn, Transitions
+from irl.learners.adopting import adopt
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures, Spaces, widened
 from irl.learners.heads import Lowest, Quantiles
@@ -303,6 +304,16 @@ class SACLearner:
             PolicySpec(self.env_id, *sizes, self.config.hidden, "relu", "squashed_gaussian"), weights
         )
 
+    def adopt(self, policy: Policy) -> None:
+        """Act as `policy` does from now on; the random steps at the start stay.
+
+        Raises:
+            ValueError: its layers are of other sizes.
+        """
+        adopt(_acting(self.model.actor), policy)
+        self._update.refresh()
+        self._average = WeightAverage(_actor_weights(self.model.actor), self.config.average)
+
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on, between two rounds."""
         return {
@@ -351,6 +362,10 @@ def _as_sb3(given: str) -> str | float:
 
 
 def _actor_weights(actor: Actor) -> dict[str, Tensor]:
+    return {name: weight.cpu() for name, weight in _acting(actor).items()}
+
+
+def _acting(actor: Actor) -> dict[str, Tensor]:
     """The weights that make the policy act, under the names that `Policy` has for them."""
     layers = [m for m in actor.latent_pi if isinstance(m, nn.Linear)]
     assert isinstance(actor.mu, nn.Linear)
@@ -359,4 +374,4 @@ def _actor_weights(actor: Actor) -> dict[str, Tensor]:
     for i, layer in enumerate([*layers, actor.mu]):
         weights |= {f"layers.{i}.weight": layer.weight, f"layers.{i}.bias": layer.bias}
     weights |= {"log_std.weight": actor.log_std.weight, "log_std.bias": actor.log_std.bias}
-    return {name: weight.detach().cpu() for name, weight in weights.items()}
+    return {name: weight.detach() for name, weight in weights.items()}

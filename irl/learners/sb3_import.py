@@ -142,7 +142,10 @@ def _check_bounds(path: Path, said: Mapping[str, Any], space: Box) -> None:
 def _policy(data: Mapping[str, Any], observations: gym.Space, actions: gym.Space) -> BasePolicy:
     made, settings = data["policy_class"], dict(data["policy_kwargs"] or {})
     if "Recurrent" in made.__name__:
-        raise ValueError(f"{made.__name__} remembers what it saw, which demonstrations are not made with")
+        raise ValueError(
+            f"{made.__name__} remembers what it saw, and a demonstration is made of one observation at a "
+            f"time; use --policy module:function, a function that keeps the state itself"
+        )
     if issubclass(made, ActorCriticPolicy):
         settings["use_sde"] = bool(data.get("use_sde", False))
     # a policy that is not learned by gradients has none

@@ -8,8 +8,10 @@ It takes task observations and environment-unit actions, and gives the reward be
 learner did (`reward_scale` in the specification records that). One that knows the absorbing state adds the
 indicator itself, and what that state pays at a termination (`irl.rewards.tail`). No pickle is read.
 
+Several networks of one kind may be behind it (`irl.rewards.ensemble`).
+
 Version 1 had no absorbing state and no spectral norm, version 2 logits of (s, a) only, version 3 no bound of
-log pi; they are read as such.
+log pi, version 4 no ensembles and no logits of (s, a, s'); they are read as such.
 """
 
 import itertools
@@ -29,12 +31,15 @@ from irl.core.errors import UserError
 from irl.core.nets import Normaliser
 from irl.policies.density import Density
 from irl.policies.policy import load_policy
+from irl.rewards.ensemble import EnsembleNet, EnsembleSpec
 from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.maps import MAPS
 from irl.rewards.nets import LogitNet, LogitSpec
 from irl.rewards.shaped import ENTROPIC, PARTS, ShapedNet, ShapedSpec
 
-FORMAT, VERSION = "irl.reward", 4
+Spec = LogitSpec | ShapedSpec | EnsembleSpec
+
+FORMAT, VERSION = "irl.reward", 5
 READABLE = [(FORMAT, version) for version in range(1, VERSION + 1)]
 SPEC, WEIGHTS = "spec.json", "weights.safetensors"
 ADDED_IN_2 = {"absorbing_scale": 0.0, "spectral_norm": False}
@@ -47,7 +52,7 @@ POLICY = "policy.safetensors"
 """Of a snapshot, beside the folder of its reward."""
 
 
-def save_reward(folder: Path, spec: RewardSpec, net: LogitNet | ShapedNet) -> None:
+def save_reward(folder: Path, spec: RewardSpec, net: LogitNet | ShapedNet | EnsembleNet) -> None:
     """Write a reward that `load_reward` gives back."""
     weights = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
     files.write_bytes(folder / WEIGHTS, save(weights))
@@ -79,7 +84,7 @@ def load_reward(path: Path | str, part: str | None = None) -> LearnedReward:
         raise UserError(f"{folder} is not a reward this version reads: {json.dumps(str(error))}") from error
     if part is None:
         return LearnedReward(spec, net)
-    if part not in (known := (*PARTS, ENTROPIC) if isinstance(net, ShapedNet) else ()):
+    if part not in (known := (*PARTS, ENTROPIC) if isinstance(_one(net.spec), ShapedSpec) else ()):
         has = f"choose one of {', '.join(known)}" if known else "only AIRL's rewards have; leave it out"
         raise UserError(f"the reward of {spec.method} in {folder} has no part {part!r:.40}; {has}")
     return LearnedReward(replace(spec, reward_map=part), net, _density(folder) if part == ENTROPIC else None)
@@ -126,19 +131,25 @@ def _specification(folder: Path, content: Any) -> RewardSpec:
     return spec
 
 
-def _payable(spec: LogitSpec | ShapedSpec) -> tuple[str, ...]:
+def _one(spec: Spec) -> LogitSpec | ShapedSpec:
+    return spec.of if isinstance(spec, EnsembleSpec) else spec
+
+
+def _payable(spec: Spec) -> tuple[str, ...]:
     """What a reward of this kind can pay."""
-    return tuple(MAPS) if isinstance(spec, LogitSpec) else PARTS
+    return tuple(MAPS) if isinstance(_one(spec), LogitSpec) else PARTS
 
 
-def _empty(spec: LogitSpec | ShapedSpec) -> LogitNet | ShapedNet:
+def _empty(spec: Spec) -> LogitNet | ShapedNet | EnsembleNet:
     normaliser, generator = Normaliser(spec.obs_dim), torch.Generator()
+    if isinstance(spec, EnsembleSpec):
+        return EnsembleNet(spec, normaliser, generator)
     if isinstance(spec, LogitSpec):
         return LogitNet(spec, normaliser, generator)
     return ShapedNet(spec, normaliser, generator)
 
 
-def _check_weights(spec: LogitSpec | ShapedSpec, weights: dict[str, Tensor]) -> None:
+def _check_weights(spec: Spec, weights: dict[str, Tensor]) -> None:
     """Refuse weights that are not finite, and a specification of more than there are.
 
     Raises:

@@ -7,7 +7,8 @@ A network that knows the absorbing state s_abs (`absorbing_scale` c > 0) sees on
 x = [normalise(s) (1 - z), a, c z],  z = 1 in s_abs, else 0
 
 A network of states alone sees [normalise(s)], and one of pairs [normalise(s), normalise(s')], with an
-indicator for each state: they learn from demonstrations without actions.
+indicator for each state: they learn from demonstrations without actions. One of whole steps sees
+[normalise(s), a, normalise(s')].
 
 The indicator is not normalised: where every demonstration lasts to the time limit it is constant, and
 its moments would say nothing. c is its distance from the other states; under a gradient penalty, which
@@ -25,7 +26,12 @@ from irl.core.config import check_at_least
 from irl.core.nets import Normaliser, SpectralLinear, mlp
 from irl.core.types import Transitions
 
-SEES = {"obs_action": "obs, action", "obs": "obs", "obs_next_obs": "obs, next obs"}
+SEES = {
+    "obs_action": "obs, action",
+    "obs": "obs",
+    "obs_next_obs": "obs, next obs",
+    "obs_action_next_obs": "obs, action, next obs",
+}
 """What a network may judge a step by, in words."""
 
 
@@ -53,13 +59,13 @@ class LogitSpec:
     @property
     def inputs(self) -> int:
         """Numbers the perceptron sees."""
-        second = {"obs_action": self.action_dim, "obs": 0, "obs_next_obs": self.obs_dim}[self.sees]
-        return self.obs_dim + second + self.indicators
+        more = ("action" in self.sees) * self.action_dim + ("next_obs" in self.sees) * self.obs_dim
+        return self.obs_dim + more + self.indicators
 
     @property
     def indicators(self) -> int:
         """Indicators of s_abs: one for each state that is seen."""
-        return (self.absorbing_scale > 0) * (2 if self.sees == "obs_next_obs" else 1)
+        return (self.absorbing_scale > 0) * (2 if "next_obs" in self.sees else 1)
 
     @property
     def sizes(self) -> tuple[tuple[int, ...], ...]:
@@ -86,9 +92,9 @@ class LogitNet(nn.Module):
         if not self.spec.absorbing_scale and absorbing is not None and bool(absorbing.any()):
             raise ValueError("the batch has steps in the absorbing state, which this network does not know")
         parts, flags = [self._state(batch.obs, absorbing)], [absorbing]
-        if self.spec.sees == "obs_action":
+        if "action" in self.spec.sees:
             parts.append(batch.action)
-        elif self.spec.sees == "obs_next_obs":
+        if "next_obs" in self.spec.sees:
             # a recorded termination leads into s_abs, whether it was put into the data or not
             after = batch.terminated
             flags.append(after if batch.next_absorbing is None else after | batch.next_absorbing)

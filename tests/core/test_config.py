@@ -9,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from irl.algorithms.adversarial import ScheduleConfig
+from irl.algorithms.bc import WarmStartConfig
 from irl.core.config import from_json, to_json
 from irl.core.errors import UserError
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
-from irl.experiment.configs import AIRLRun, DACRun, ExpertRun, GAILRun, GAILSACRun, Watch
+from irl.experiment.configs import AIRLRun, BCRun, DACRun, ExpertRun, GAILRun, GAILSACRun, Watch
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 
@@ -196,12 +197,14 @@ CHANGED = GAILRun(
     watch=WATCH,
     device="cuda",
     threads=2,
+    warm_start=WarmStartConfig(updates=7),
+    preset="dac-paper",
 )
 EXPERT = ExpertRun("Hopper-v5", "expert", 10, 1, Path("runs/e"), PPO, WATCH, "cpu", 1)
 
 
 @pytest.mark.parametrize(
-    "config", [GAIL, GAIL.resolved(), CHANGED, EXPERT, GAILSACRun("A-v1"), DACRun("A-v1")]
+    "config", [GAIL, GAIL.resolved(), CHANGED, EXPERT, GAILSACRun("A-v1"), DACRun("A-v1"), BCRun("A-v1")]
 )
 def test_the_settings_of_a_run_come_back_through_json(config: Any) -> None:
     assert through_json(config) == config
@@ -210,7 +213,9 @@ def test_the_settings_of_a_run_come_back_through_json(config: Any) -> None:
 
 def test_every_setting_that_differs_is_seen_in_the_json() -> None:
     before, after = to_json(GAIL), to_json(CHANGED)
-    assert [name for name in before if before[name] == after[name]] == ["kind"]
+    assert [name for name in before if before[name] == after[name]] == ["kind", "seeds"]
+    # of a seed and several seeds only one is named
+    assert to_json(replace(CHANGED, seed=0, seeds="1-2"))["seeds"] == "1-2"
 
 
 def test_a_run_that_contradicts_itself_is_the_users_to_mend() -> None:

@@ -1,13 +1,15 @@
 import itertools
+import math
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.stats import trim_mean
 
 from irl.core.rng import stream
-from irl.core.statistics import auroc, is_constant, kendall, pearson, spearman
+from irl.core.statistics import auroc, iqm, iqm_interval, is_constant, kendall, pearson, spearman
 
 small = st.integers(-3, 3).map(float)
 
@@ -82,3 +84,22 @@ def test_auroc_without_one_of_the_groups_is_undefined() -> None:
 def test_constant_means_up_to_the_rounding_of_a_sum() -> None:
     assert is_constant(np.array([0.3, 0.1 + 0.2]))
     assert not is_constant(np.array([1.0, 1.0 + 1e-9]))
+
+
+def test_the_interquartile_mean_cuts_whole_values_off_both_ends() -> None:
+    assert iqm(np.array([9.0, 1.0, 2.0, -50.0])) == 1.5
+    assert iqm(np.array([3.0, 4.0, 5.0])) == 4.0
+    assert iqm(np.arange(8.0)) == trim_mean(np.arange(8.0), 0.25)
+    assert math.isnan(iqm(np.array([])))
+    assert math.isnan(iqm(np.array([1.0, np.inf])))
+
+
+def test_its_interval_lies_around_it_and_one_value_has_none() -> None:
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=200)
+    low, high = iqm_interval(values, rng)
+    # the interquartile mean of a normal has a standard error of about 1.09 / sqrt(n)
+    assert high - low == pytest.approx(2 * 1.96 * 1.09 / np.sqrt(200), rel=0.25)
+    assert low < iqm(values) < high
+    assert all(math.isnan(end) for end in iqm_interval(np.array([1.0]), rng))
+    assert iqm_interval(np.array([2.0, 2.0]), rng) == (2.0, 2.0)

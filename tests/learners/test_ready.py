@@ -7,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import A2C, PPO, SAC
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 from torch import Tensor
@@ -174,3 +175,10 @@ def test_what_only_irls_own_learners_have_is_said_to_be_missing() -> None:
     assert learner.take_finished() == []
     learner.collect()
     assert len(learner.take_finished()) == 128 // pointmass.STEPS // 2 * 2
+
+
+def test_a_recurrent_model_is_refused_with_the_reason_and_what_to_use() -> None:
+    small: dict[str, Any] = {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"lstm_hidden_size": 4}}
+    model = RecurrentPPO("MlpLstmPolicy", gym.make("PointMass-v0"), **small)
+    with pytest.raises(ValueError, match=r"RecurrentPPO remembers what it saw.*MlpPolicy.*FrameStack"):
+        ready(model, 100)

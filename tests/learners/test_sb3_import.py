@@ -152,3 +152,10 @@ def test_only_the_policy_is_unpickled(tmp_path, monkeypatch) -> None:
     load_sb3(OLD, env)
     # the class; the settings of this one are JSON
     assert len(read) == 1
+
+
+def test_a_recurrent_policy_is_refused_with_the_reason_and_what_to_use(tmp_path) -> None:
+    task = gym.make("Pendulum-v1")
+    sb3_contrib.RecurrentPPO("MlpLstmPolicy", task, n_steps=8, batch_size=8).save(tmp_path / "a.zip")
+    with pytest.raises(UserError, match=r"remembers what it saw.*--policy module:function"):
+        load_sb3(tmp_path / "a.zip", task)

@@ -89,7 +89,7 @@ def test_it_takes_raw_observations_and_is_frozen(folder: Path) -> None:
 
 def test_the_specification_is_plain_json(folder: Path) -> None:
     content = json.loads((folder / SPEC).read_text())
-    assert (content["format"], content["version"]) == ("irl.reward", 4)
+    assert (content["format"], content["version"]) == ("irl.reward", 5)
     assert content["net"] == {
         "kind": "logit",
         "obs_dim": 3,
@@ -105,11 +105,11 @@ def test_the_specification_is_plain_json(folder: Path) -> None:
     assert sorted(path.name for path in folder.iterdir()) == [SPEC, WEIGHTS]
 
 
-@pytest.mark.parametrize("version", [1, 2, 3])
+@pytest.mark.parametrize("version", [1, 2, 3, 4])
 def test_a_reward_of_an_older_version_is_read_as_it_was(folder: Path, version: int) -> None:
     def as_it_was(content: dict[str, Any]) -> None:
         content["version"] = version
-        for name in ("kind", "sees", "absorbing_scale", "spectral_norm")[: {1: 4, 2: 2, 3: 0}[version]]:
+        for name in ("kind", "sees", "absorbing_scale", "spectral_norm")[: {1: 4, 2: 2, 3: 0, 4: 0}[version]]:
             del content["net"][name]
 
     now = load_reward(folder)
@@ -164,8 +164,8 @@ def test_a_place_without_a_reward_is_refused(tmp_path: Path, below: str) -> None
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda c: c.update(version=5), "expected format irl.reward 1 to 4, found 'irl.reward' 5"),
-        (lambda c: c.update(format="irl.policy"), "expected format irl.reward 1 to 4, found 'irl.policy'"),
+        (lambda c: c.update(version=6), "expected format irl.reward 1 to 5, found 'irl.reward' 6"),
+        (lambda c: c.update(format="irl.policy"), "expected format irl.reward 1 to 5, found 'irl.policy'"),
         (lambda c: c.update(reward_map="airy"), "unknown map 'airy'; known: gail"),
         (lambda c: c.update(extra=1), "spec.json: unknown extra; known: env_id"),
         (lambda c: c.pop("gamma"), "spec.json: missing gamma"),

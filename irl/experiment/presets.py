@@ -1,0 +1,208 @@
+"""Settings of papers and of their code, as data: `irl train METHOD --preset NAME`.
+
+What irl has not is not imitated: each row says what is another thing here. A setting that a source leaves
+open is the method's own.
+"""
+
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+from irl.core.errors import UserError
+
+
+@dataclass(frozen=True)
+class Preset:
+    """One recipe."""
+
+    method: str
+    """The `irl train` command that it is of."""
+    source: str
+    """Where the numbers are from: read there, not remembered."""
+    differs: str
+    """What is not as there."""
+    settings: dict[str, Any]
+    """Dotted names and values."""
+
+
+_SAC = {"learner.quantiles": 0, "learner.average": 0.0, "learner.lr_schedule": "constant"}
+
+PRESETS: dict[str, Preset] = {
+    "dac-paper": Preset(
+        "dac",
+        "the code of Kostrikov et al. (2019), arXiv:1809.02925: google-research/dac",
+        "the learner is SAC (TD3 there); updates follow each step (each episode there)",
+        _SAC
+        | {
+            "demo_episodes": 4,
+            "demo_rate": 20,
+            "steps": 1_000_000,
+            "learner.hidden": (400, 300),
+            "learner.lr": 1e-3,
+            "learner.batch_size": 100,
+            "learner.learning_starts": 1000,
+            "discriminator.hidden": (256, 256),
+            "discriminator.lr": 1e-3,
+            "discriminator.gradient_penalty": 10.0,
+            "discriminator.absorbing_scale": 1.0,
+        },
+    ),
+    "orsini": Preset(
+        "gail-sac",
+        "run_gail.py of acme, released beside Orsini et al. (2021), arXiv:2106.00672",
+        "the learner is SAC (TD3 there)",
+        _SAC
+        | {
+            "steps": 1_000_000,
+            "learner.lr": 3e-4,
+            "learner.batch_size": 256,
+            "discriminator.hidden": (64,),
+            "discriminator.activation": "relu",
+            "discriminator.spectral_norm": True,
+            "discriminator.gradient_penalty": 10.0,
+            "discriminator.entropy": 1e-3,
+            "discriminator.lr": 1e-5,
+            "discriminator.reward_map": "gail",
+        },
+    ),
+    "pragmatic": Preset(
+        "dac",
+        "the default settings in the code of Arulkumaran & Lillrank (2023), A Pragmatic Look at Deep "
+        "Imitation Learning",
+        "weight decay is on the discriminator alone; one hidden layer of 64",
+        _SAC
+        | {
+            "steps": 1_000_000,
+            "learner.lr": 3e-4,
+            "learner.gamma": 0.97,
+            "discriminator.hidden": (64,),
+            "discriminator.activation": "relu",
+            "discriminator.lr": 3e-5,
+            "discriminator.weight_decay": 10.0,
+            "discriminator.gradient_penalty": 1.0,
+            "discriminator.penalty_center": 0.0,
+            "discriminator.spectral_norm": True,
+            "discriminator.input_dropout": 0.5,
+            "discriminator.dropout": 0.75,
+        },
+    ),
+    "gail-paper": Preset(
+        "gail",
+        "the code of Ho & Ermon (2016), arXiv:1606.03476: openai/imitation",
+        "the learner is PPO (TRPO there)",
+        {
+            "demo_rate": 20,
+            "steps": 25_000_000,
+            "learner.steps_per_round": 50_000,
+            "learner.batch_size": 500,
+            "learner.gamma": 0.995,
+            "learner.gae_lambda": 0.97,
+            "learner.hidden": (100, 100),
+            "discriminator.lr": 1e-2,
+            "discriminator.gradient_penalty": 0.0,
+            "discriminator.entropy": 1e-3,
+            "schedule.batch_size": 50_000,
+            "schedule.epochs": 1,
+        },
+    ),
+    "kostrikov-ppo": Preset(
+        "gail",
+        "the code of Kostrikov: pytorch-a2c-ppo-acktr-gail",
+        "no warm-up of 100 epochs in the first ten rounds; observations are normalised by the demonstrations",
+        {
+            "steps": 10_000_000,
+            "discriminator.hidden": (100, 100),
+            "discriminator.lr": 1e-3,
+            "discriminator.gradient_penalty": 10.0,
+            "discriminator.reward_map": "logit",
+            "schedule.batch_size": 128,
+            "schedule.epochs": 5,
+        },
+    ),
+    "imitation-halfcheetah": Preset(
+        "gail",
+        "tuned_hps/gail_seals_half_cheetah_best_hp_eval.json of HumanCompatibleAI/imitation 1.0.1",
+        "eight discriminator steps a round of 4096 rows each (8192 there); policy and value share no layers",
+        {
+            "steps": 10_000_000,
+            "learner.n_envs": 8,
+            "learner.steps_per_round": 4096,
+            "learner.batch_size": 64,
+            "learner.n_epochs": 5,
+            "learner.clip_range": 0.1,
+            "learner.lr": 2.625e-4,
+            "learner.lr_schedule": "constant",
+            "learner.gamma": 0.95,
+            "learner.gae_lambda": 0.95,
+            "learner.ent_coef": 3.992e-6,
+            "learner.vf_coef": 0.1148,
+            "learner.max_grad_norm": 0.8,
+            "learner.hidden": (32, 32),
+            "discriminator.hidden": (32, 32),
+            "discriminator.activation": "relu",
+            "discriminator.gradient_penalty": 0.0,
+            "schedule.batch_size": 4096,
+            "schedule.epochs": 8,
+        },
+    ),
+    "airl-paper": Preset(
+        "airl",
+        "appendix D and the code of Fu et al. (2018), arXiv:1710.11248",
+        "the learner is PPO (TRPO there) and is paid f (g there); gamma in f is the learner's (1 there)",
+        {
+            "steps": 5_000_000,
+            "learner.n_envs": 10,
+            "learner.steps_per_round": 10_000,
+            "learner.batch_size": 500,
+            "learner.gae_lambda": 1.0,
+            "learner.ent_coef": 0.1,
+            "discriminator.hidden": (32, 32),
+            "discriminator.potential_hidden": (32, 32),
+            "discriminator.activation": "relu",
+            "discriminator.lr": 1e-3,
+            "discriminator.reward": "f",
+            "discriminator.terminal": "mask",
+            "discriminator.gradient_penalty": 0.0,
+            "schedule.batch_size": 100,
+            "schedule.epochs": 1,
+            "schedule.warmup_rounds": 0,
+            "schedule.negatives": 20,
+        },
+    ),
+}
+"""By name."""
+
+
+def with_preset(config: Any, name: str) -> Any:
+    """The run `config` with the settings of a preset.
+
+    Raises:
+        UserError: there is no such preset, or it is of another method.
+    """
+    if name not in PRESETS:
+        raise UserError(f"no preset {name!r:.40}; there are: {', '.join(PRESETS)}")
+    preset = PRESETS[name]
+    if preset.method != config.KIND:
+        raise UserError(
+            f"preset {name} is of {preset.method}, not of {config.KIND}; use: irl train {preset.method} "
+            f"--preset {name}"
+        )
+    return replace(_changed(config, preset.settings), preset=name)
+
+
+def _changed(config: Any, settings: dict[str, Any]) -> Any:
+    """The same with these dotted names set, all of one part at once: settings may only fit together."""
+    known = {field.name for field in fields(config)}
+    parts: dict[str, dict[str, Any]] = {}
+    values: dict[str, Any] = {}
+    for name, value in settings.items():
+        head, _, rest = name.partition(".")
+        if head not in known:
+            raise KeyError(f"{type(config).__name__} has no setting {head}")
+        if rest:
+            parts.setdefault(head, {})[rest] = value
+        else:
+            values[head] = value
+    for head, inner in parts.items():
+        assert is_dataclass(getattr(config, head))
+        values[head] = _changed(getattr(config, head), inner)
+    return replace(config, **values)

@@ -1,0 +1,135 @@
+"""`irl train ... --seeds 0-4`: the same run from several seeds, and what they come to together.
+
+    OUT/s0  OUT/s1 ...    run folders as one seed makes them
+    OUT/seeds.json        the last evaluation of each, their interquartile mean and its interval
+
+One after the other in one process, each to the bit what it would be alone. Typed again, the command goes on
+where it was stopped.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from irl.core import files
+from irl.core.config import to_json
+from irl.core.differences import differences, without
+from irl.core.errors import UserError
+from irl.core.records import RunFolder, open_run
+from irl.core.rng import stream
+from irl.core.statistics import iqm, iqm_interval
+from irl.experiment.configs import FromDemonstrations
+from irl.experiment.judge import finite
+from irl.experiment.play import MAY_CHANGE
+from irl.policies import shelf
+from irl.policies.card import normalised_score
+
+SUMMARY = "seeds.json"
+NOT_EVALUATED = "the run ended without an evaluation: --watch.eval-episodes is 0"
+ONE_SEED = "one seed says nothing of another"
+
+
+def train_seeds(
+    config: FromDemonstrations,
+    begin: Callable[[FromDemonstrations], None],
+    go_on: Callable[[Path], None],
+) -> None:
+    """Begin each seed's run, or go on with it; then write and print the summary.
+
+    Raises:
+        UserError: a folder is there and is of other settings.
+    """
+    numbers, root = config.seed_numbers, config.folder_of_seeds
+    runs = [replace(config, seed=seed, seeds="", out=root / f"s{seed}") for seed in numbers]
+    begun = [run for run in runs if _is_there(run)]
+    for run in runs:
+        assert run.out is not None
+        if run in begun:
+            go_on(run.out)
+        else:
+            begin(run)
+    result = summary(config, [open_run(root / f"s{seed}") for seed in numbers])
+    files.write_json(root / SUMMARY, result)
+    Console().print(table(result))
+    Console().print(f"summary: {root / SUMMARY}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _is_there(run: FromDemonstrations) -> bool:
+    assert run.out is not None
+    if not (run.out / "config.json").is_file():
+        return False
+    asked, there = to_json(run.resolved()), open_run(run.out).config
+    if changed := differences(without(there, MAY_CHANGE), without(asked, MAY_CHANGE)):
+        raise UserError(
+            f"{run.out} is there with other settings: {'; '.join(changed)}. Choose another folder with --out"
+        )
+    return True
+
+
+def summary(config: FromDemonstrations, runs: Sequence[RunFolder]) -> dict[str, Any]:
+    """What `seeds.json` holds: every seed singly, then the score, or where it is unknown the return."""
+    env_id = config.resolved().env_id
+    card = shelf.expert_card(env_id, None)
+    rows = []
+    for run, seed in zip(runs, config.seed_numbers, strict=True):
+        last = run.metrics()[-1]
+        value = last.get("eval_return_mean")
+        score = None
+        if value is not None and card is not None:
+            score = normalised_score(value, card.random_return_mean, card.measured.return_mean)
+        rows.append(
+            {
+                "seed": seed,
+                "run": run.path.name,
+                "env_steps": last["env_steps"],
+                "eval_return_mean": value,
+                "score": None if score is None else finite(score),
+            }
+        )
+    measured = "score" if card is not None else "eval_return_mean"
+    values = np.array([np.nan if row[measured] is None else row[measured] for row in rows])
+    low, high = iqm_interval(values, stream(0, "seeds"))
+    reason = NOT_EVALUATED if np.isnan(values).any() else ONE_SEED if len(values) < 2 else None
+    return {
+        "format": "irl.seeds",
+        "version": 1,
+        "method": config.KIND,
+        "env_id": env_id,
+        "evaluation_episodes": config.watch.eval_episodes,
+        "measured": measured,
+        "seeds": rows,
+        "iqm": finite(iqm(values)),
+        "interval_95": [finite(low), finite(high)],
+        "interval_95_reason": reason,
+    }
+
+
+def table(result: dict[str, Any]) -> Table:
+    """The summary to print."""
+    of = "normalised score" if result["measured"] == "score" else "return"
+    drawn = Table(
+        box=box.SIMPLE_HEAD, title=f"{result['method']} on {result['env_id']}", title_justify="left"
+    )
+    for name in ("seed", "steps", "return", "score"):
+        drawn.add_column(name, justify="right")
+    for row in result["seeds"]:
+        shown = (_number(row["eval_return_mean"], 1), _number(row["score"], 3))
+        drawn.add_row(str(row["seed"]), f"{row['env_steps']:,}", *shown)
+    low, high = result["interval_95"]
+    interval = f"[{low:.3f}, {high:.3f}]" if low is not None else result["interval_95_reason"]
+    middle = "not known" if result["iqm"] is None else f"{result['iqm']:.3f}"
+    drawn.caption = (
+        f"interquartile mean of the {of}: {middle}, 95 % {interval}; last evaluation of each seed, "
+        f"{result['evaluation_episodes']} episodes"
+    )
+    return drawn
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "not known" if value is None else f"{value:.{digits}f}"

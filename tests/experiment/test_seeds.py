@@ -1,0 +1,65 @@
+"""`--seeds`: a run folder each, to the bit what it would be alone, and one summary."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from irl.core import files
+from irl.core.records import open_run
+from irl.experiment.configs import BCRun, GAILRun
+from irl.policies.policy import load_policy
+from tests.experiment.conftest import QUICK, TASK
+
+Command = Callable[..., None]
+WORDS = ("--env-id", TASK, *QUICK, "--steps=256", "--watch.no-tensorboard")
+
+
+def weights(run: Path) -> dict[str, np.ndarray]:
+    return load_policy(list(open_run(run).snapshots().values())[-1] / "policy.safetensors").weights
+
+
+def test_each_seed_is_as_it_is_alone_and_the_summary_says_what_they_come_to(
+    irl: Command, capsys: pytest.CaptureFixture
+) -> None:
+    irl("train", "gail", *WORDS, "--seeds", "3,0-1", "--out", "many")
+    irl("train", "gail", *WORDS, "--seed", "1", "--out", "alone")
+    together, alone = weights(Path("many/s1")), weights(Path("alone"))
+    assert all(np.array_equal(together[name], alone[name]) for name in alone)
+    found = files.read_json(Path("many/seeds.json"))
+    assert [row["seed"] for row in found["seeds"]] == [3, 0, 1]
+    scores = sorted(row["score"] for row in found["seeds"])
+    assert found["iqm"] == pytest.approx(np.mean(scores))
+    assert scores[0] <= found["interval_95"][0] <= found["interval_95"][1] <= scores[-1]
+    assert files.read_json(Path("many/s3/config.json"))["seed"] == 3
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "interquartile mean of the normalised score" in printed
+    # again: nothing is trained anew, one more seed is begun
+    before = (Path("many/s0") / "metrics.jsonl").read_bytes()
+    irl("train", "gail", *WORDS, "--seeds", "0,2", "--out", "many")
+    assert (Path("many/s0") / "metrics.jsonl").read_bytes() == before
+    assert [row["seed"] for row in files.read_json(Path("many/seeds.json"))["seeds"]] == [0, 2]
+    with pytest.raises(SystemExit):
+        irl("train", "gail", *WORDS, "--seeds", "0,2", "--out", "many", "--discriminator.lr", "0.1")
+    assert "many/s0 is there with other settings: discriminator.lr was" in capsys.readouterr().err
+
+
+def test_one_seed_has_no_interval_and_an_unmeasured_run_no_score(irl: Command) -> None:
+    words = ("--steps=20", "--learner.steps-per-round=20", "--watch.no-progress", "--watch.eval-episodes=0")
+    irl("train", "bc", "--env-id", TASK, "--demo-episodes=2", *words, "--seeds", "5", "--out", "one")
+    found = files.read_json(Path("one/seeds.json"))
+    assert (found["iqm"], found["interval_95"]) == (None, [None, None])
+    assert "without an evaluation" in found["interval_95_reason"]
+
+
+@pytest.mark.parametrize("words", ["a", "4-0", "1,1", "0-3,2", "-1", ",", "0-99999"])
+def test_seeds_that_are_none_are_refused(words: str) -> None:
+    with pytest.raises(ValueError, match="seeds"):
+        GAILRun(TASK, seeds=words)
+
+
+def test_a_seed_and_several_are_refused() -> None:
+    with pytest.raises(ValueError, match="one of --seed 1 and --seeds 0-1"):
+        BCRun(TASK, seed=1, seeds="0-1")
+    assert GAILRun(TASK, seeds="0-2,7").seed_numbers == (0, 1, 2, 7)

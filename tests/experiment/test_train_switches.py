@@ -1,0 +1,61 @@
+"""Switches from the command line to a saved reward that is read and judged."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import torch
+
+from irl.core import files
+from irl.core.records import open_run
+from irl.core.types import from_episodes
+from irl.demos.load import load_demos
+from irl.rewards.artefact import load_reward
+from irl.rewards.ensemble import EnsembleNet
+from tests.experiment.conftest import DATASET, QUICK, TASK
+
+Command = Callable[..., None]
+WORDS = ("--env-id", TASK, *QUICK, "--steps=256", "--watch.no-tensorboard")
+
+
+def last(run: str) -> Path:
+    return list(open_run(Path(run)).snapshots().values())[-1]
+
+
+@pytest.mark.parametrize("method", ["gail", "airl"])
+def test_an_ensemble_is_saved_read_and_judged(irl: Command, method: str) -> None:
+    several = ("--discriminator.ensemble=3", "--discriminator.ensemble-reward=lowest")
+    irl("train", method, *WORDS, *several, "--out", "run", "--watch.checkpoint-every-s=0")
+    reward = load_reward("run")
+    assert isinstance(reward.net, EnsembleNet)
+    batch = from_episodes(load_demos(DATASET, episodes=2))
+    each = torch.stack([member(batch) for member in reward._members])
+    assert torch.equal(reward(batch), each.amin(0))
+    assert torch.equal(reward.to("cpu")(batch), reward(batch))
+    assert torch.isfinite(reward.anchored(batch)).all()
+    assert files.read_json(last("run") / "reward" / "spec.json")["net"]["kind"] == "ensemble"
+    before = (last("run") / "reward" / "weights.safetensors").read_bytes()
+    torn = list(open_run(Path("run")).checkpoints().values())[-1] / "state.safetensors"
+    torn.write_bytes(b"torn")
+    irl("train", "--resume", "run")
+    assert (last("run") / "reward" / "weights.safetensors").read_bytes() == before
+    irl("evaluate", "run", "--episodes=2", "--probe-steps=50")
+
+
+def test_whole_steps_are_judged_and_the_settings_are_written_down(irl: Command) -> None:
+    more = ("--discriminator.inputs=obs_action_next_obs", "--discriminator.mixup=0.5")
+    irl("train", "gail", *WORDS, *more, "--discriminator.weight-decay=0.1", "--out", "run")
+    reward = load_reward("run")
+    assert reward.spec.inputs == "obs, action, next obs"
+    batch = from_episodes(load_demos(DATASET, episodes=1))
+    other = from_episodes(load_demos(DATASET, episodes=1))
+    moved = type(batch)(other.obs, other.action, other.next_obs + 1.0, other.terminated, other.truncated)
+    assert not torch.allclose(reward(batch), reward(moved))
+    assert files.read_json(Path("run/config.json"))["discriminator"]["mixup"] == 0.5
+
+
+def test_what_is_refused_is_one_line_with_the_reason(irl: Command, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit):
+        irl("train", "airl", *WORDS, "--discriminator.loss=wasserstein", "--out", "run")
+    assert "AIRL has no loss wasserstein: log pi falls out" in capsys.readouterr().err
+    assert not Path("run").exists()
