@@ -14,8 +14,8 @@ from jaxtyping import Float
 from stable_baselines3 import PPO
 from stable_baselines3.common.buffers import RolloutBuffer
 from torch import Tensor, nn
-from torch.optim.adam import adam
 
+from irl.core import adam
 from irl.core.flat import flattened, linear_layers
 from irl.core.types import Metrics
 from irl.learners import ppo_losses as losses
@@ -137,28 +137,7 @@ class PPOUpdate:
         # torch.nn.utils.clip_grad_norm_ of the whole, without its norm of each part
         length = torch.linalg.vector_norm(self._gradient)
         self._gradient *= (longest / (length + 1e-6)).clamp(max=1.0)
-        if len(self.optimizer.state) < len(self._trained):
-            # it makes its moments in its first step
-            self.optimizer.step()
-            return
-        state, group = [self.optimizer.state[p] for p in self._trained], self.optimizer.param_groups[0]
-        # what `optimizer.step` calls after checks that take as long as the rest of it
-        adam(
-            list(self._trained),
-            list(self._gradients),
-            [of_one["exp_avg"] for of_one in state],
-            [of_one["exp_avg_sq"] for of_one in state],
-            [],
-            [of_one["step"] for of_one in state],
-            fused=True,
-            amsgrad=False,
-            beta1=group["betas"][0],
-            beta2=group["betas"][1],
-            lr=group["lr"],
-            weight_decay=0.0,
-            eps=group["eps"],
-            maximize=False,
-        )
+        adam.step(self.optimizer)
 
     def _rollout(self, buffer: RolloutBuffer) -> Rollout:
         """The buffer's rows, environment by environment, with normalised observations."""
