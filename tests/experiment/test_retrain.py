@@ -23,6 +23,7 @@ from irl.learners.sac import SACConfig
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
 from irl.rewards.maps import MAPS
+from irl.rewards.nets import LogitNet
 from tests.experiment.conftest import DATASET, QUICK, TASK
 
 Command = Callable[..., None]
@@ -236,6 +237,7 @@ def test_ppo_is_paid_what_the_absorbing_state_pays_where_the_task_ended() -> Non
     assert ended.any()
     going_on = replace(batch, terminated=torch.zeros_like(ended))
     added = algorithm.reward(batch) - algorithm.reward(going_on)
+    assert isinstance(reward.net, LogitNet)
     gamma, of_absorbing = reward.spec.gamma, MAPS[reward.spec.reward_map](reward.net.of_absorbing())
     tail = gamma / (1.0 - gamma) * of_absorbing.expand(int(ended.sum()))
     torch.testing.assert_close(added[ended], tail)

@@ -116,7 +116,7 @@ def test_environment_and_evaluation(world: Path, data: st.DataObject) -> None:
 @settings(few, max_examples=8)
 @given(st.data())
 def test_a_whole_report(world: Path, data: st.DataObject) -> None:
-    assert read(world / "run/evaluation.json", lambda: render(read_run(world / "run")), data)
+    assert read(world / "run/evaluation.json", lambda: render([read_run(world / "run")]), data)
 
 
 @few

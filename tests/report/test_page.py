@@ -107,9 +107,10 @@ def compare_one(run: RunFiles) -> Panel:
 
 READERS = {
     "verdicts": [verdicts], "chosen": [verdicts], "distances": [maps, trust, summary], "terms": [weights],
-    "residual": [weights], "ledger": [trust], "episodes": [viewer], "proxy_gold": [gold], "cross_play": [crossplay],
-    "snapshots": [fan, maps, moved], "moves": [moved], "health": [moved], "to_truth": [compare_one], "outside": [trust],
-    "fan": [fan], "maps": [maps], "against": [agreement], "residuals": [agreement],
+    "residual": [weights], "ledger": [trust], "episodes": [viewer], "proxy_gold": [gold],
+    "cross_play": [crossplay], "snapshots": [fan, maps, moved], "moves": [moved], "health": [moved],
+    "to_truth": [compare_one], "outside": [trust], "fan": [fan], "maps": [maps], "against": [agreement],
+    "residuals": [agreement],
 }  # fmt: skip
 """Who reads a part of the evaluation, by its first name or by that within `drift` and its `pictures`."""
 FILLERS = (None, "text", {}, [None], True, -1)

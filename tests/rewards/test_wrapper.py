@@ -58,6 +58,7 @@ def test_in_hopper_it_pays_what_the_learned_reward_says_of_the_recorded_steps(sc
     assert all("reward_forward" in info for info in infos)
     # falls are paid with the tail of the absorbing state, and only there
     plain = reward.logits(recorded)
+    assert isinstance(reward.net, LogitNet)
     tail = 0.95 / 0.05 * float(reward.net.of_absorbing()) if scale else 0.0
     np.testing.assert_allclose(
         np.array(rewards) - plain.numpy(), tail * recorded.terminated.numpy(), atol=1e-4
