@@ -4,7 +4,6 @@ A run's own policies lie on one road, and nearly every reward ranks those alike:
 probe's expert, middling, noisy and random strata, and what is after something else in the same body.
 """
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -51,7 +50,8 @@ class Played:
 
     players: tuple[Player, ...]
     notes: tuple[str, ...] = ()
-    cost: Mapping[str, int | float] = field(default_factory=dict)
+    cost: Mapping[str, int] = field(default_factory=dict)
+    """Steps that were played for this alone."""
 
 
 def play_policies(
@@ -62,7 +62,6 @@ def play_policies(
     Every policy starts from the same resets. A second task is another reward in the same body: a shelved
     policy of the same environment given other arguments, and holding still.
     """
-    began = time.monotonic()
     acts: list[tuple[str, str, ActFn, int | None]] = [
         (f"checkpoint at {at:,}", "checkpoint", policy, at) for at, policy in policies.items()
     ]
@@ -76,8 +75,7 @@ def play_policies(
     steps = sum(len(episode) for player in players for episode in player.episodes)
     players += [Player(name, KINDS[name], base[name]) for name in base if name in KINDS]
     notes += [f"{name}: {base.about[name]}." for name in base if name == "medium" and name in base.about]
-    cost = {"steps": steps, "seconds": round(time.monotonic() - began, 1)}
-    return Played(tuple(players), tuple(notes), cost)
+    return Played(tuple(players), tuple(notes), {"steps": steps})
 
 
 def judge_cross_play(

@@ -32,6 +32,7 @@ from irl.experiment.progress import each_episode, progress
 from irl.experiment.references import references_of
 from irl.policies.card import normalised_score, summary
 from irl.policies.policy import Policy, check_policy, load_policy
+from irl.report.folder import lookup
 from irl.report.html import write_report
 from irl.report.tables import evaluation_table
 from irl.rewards.artefact import load_reward
@@ -89,6 +90,8 @@ def evaluate(command: Evaluate) -> None:
     console.print(evaluation_table(result))
     if cost := result["drift"].get("cost"):
         asked = f"{cost['rewards']:,} rewards were asked for"
+        if played := lookup(result, "cross_play.cost.steps"):
+            asked += f", {played:,} steps played for cross-play"
         console.print(f"judged in {time.monotonic() - began:.0f} s; {asked}", highlight=False)
     console.print(f"report: {report}", highlight=False, markup=False, soft_wrap=True)
     if lines := broken(gate, result) if gate else []:
