@@ -12,28 +12,22 @@ Writes results/throughput.json.
 
 import contextlib
 import json
-import os
 import statistics
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tyro
+from contender import Contender, demonstrations, irl_words, peer_words
 
+from irl.core import products
 from irl.core.provenance import command_line, environment
-from irl.demos.load import load_demos
-from irl.envs.tasks import task_name
 
-HERE = Path(__file__).parent
-RESULTS = HERE / "results" / "throughput.json"
+RESULTS = Path(__file__).parent / "results" / "throughput.json"
 OURS = ("gail", "airl", "sb3-ppo", "dac", "dac-defaults", "dac-float32", "sb3-sac")
 PEERS = ("gail", "airl")
-EPISODES = 4
 RATIOS = {
     "gail_vs_imitation": ("gail", "imitation-gail"),
     "airl_vs_imitation": ("airl", "imitation-airl"),
@@ -52,59 +46,20 @@ class Settings:
     """Python of the peer's own environment (see throughput_peer.py); without it the peer is left out."""
     tasks: tuple[str, ...] = ("Hopper-v5", "HalfCheetah-v5")
     """Gymnasium ids; the shelf must have an expert of each."""
-    turns: int = 5
+    turns: int = 4
     """Turns of each contender."""
-    seconds: float = 6.0
+    seconds: float = 4.0
     """Least seconds of a turn; it ends with the round under way."""
     out: Path = RESULTS
     """The JSON to write."""
 
 
-class Contender:
-    """A process that trains when it is told to."""
-
-    def __init__(self, name: str, words: list[str]) -> None:
-        self.name = name
-        self._process = subprocess.Popen(
-            words,
-            text=True,
-            env={**os.environ, "OMP_NUM_THREADS": "1"},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        if self._line() != "ready":
-            raise SystemExit(f"{name} did not start; try it by hand: {' '.join(words)}")
-
-    def turn(self, seconds: float) -> dict[str, Any]:
-        """Train for at least that long: steps, seconds and shares."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(f"{seconds}\n")
-        self._process.stdin.flush()
-        return json.loads(self._line())
-
-    def _line(self) -> str:
-        assert self._process.stdout is not None
-        return self._process.stdout.readline().strip()
-
-    def close(self) -> None:
-        """End the process."""
-        self._process.kill()
-        self._process.wait()
-
-
-def demonstrations(task: str, root: Path) -> Path:
-    """The expert's episodes as a dataset in `root`, and as the arrays that the peer is given."""
-    program = "from irl.experiment.cli import main; main()"
-    words = ["demos", "generate", "--env-id", task, "--episodes", str(EPISODES), "--datasets-root", str(root)]
-    subprocess.run([sys.executable, "-c", program, *words], check=True, stdout=subprocess.DEVNULL)
-    episodes = list(load_demos(f"irl/{task_name(task)}/expert-v0", root=root))
-    arrays: dict[str, Any] = {"episodes": len(episodes)}
-    for i, e in enumerate(episodes):
-        arrays |= {f"obs{i}": e.obs, f"action{i}": e.action, f"reward{i}": e.reward}
-        arrays[f"terminal{i}"] = e.terminated
-    np.savez(path := root / f"{task}.npz", **arrays)
-    return path
+def ours() -> tuple[tuple[str, ...], dict[str, str]]:
+    """Those of ours that this processor is fit for, and why each of the others is left out."""
+    if products.fastest() == "bfloat16":
+        return OURS, {}
+    why = "this processor has no bfloat16 instructions and emulates each product"
+    return tuple(name for name in OURS if name != "dac"), {"dac": why}
 
 
 @contextlib.contextmanager
@@ -112,12 +67,12 @@ def contenders(settings: Settings, task: str, root: Path) -> Iterator[list[Conte
     """Everybody, warmed up."""
     made = []
     try:
-        for name in OURS:
-            words = [sys.executable, str(HERE / "throughput_ours.py"), name, task, str(root)]
-            made.append(Contender(name, words))
+        for name in ours()[0]:
+            made.append(Contender(name, irl_words("throughput_ours.py", name, task, str(root))))
         for name in PEERS if settings.peer_python else ():
-            script, old = str(HERE / "throughput_peer.py"), task.replace("-v5", "-v4")
-            words = [str(settings.peer_python), "-W", "ignore", script, name, old, str(root / f"{task}.npz")]
+            assert settings.peer_python is not None
+            script, demos = "throughput_peer.py", root / f"{task}.npz"
+            words = peer_words(settings.peer_python, script, task, demos, before=(name,))
             made.append(Contender(f"imitation-{name}", words))
         yield made
     finally:
@@ -147,8 +102,7 @@ def shares(settings: Settings, name: str, task: str, root: Path) -> dict[str, fl
     """Which share of its time each part of one of ours takes."""
     if name.startswith(("sb3", "imitation")):
         return {}
-    script = str(HERE / "throughput_ours.py")
-    contender = Contender(name, [sys.executable, script, name, task, str(root), "--shares"])
+    contender = Contender(name, irl_words("throughput_ours.py", name, task, str(root), "--shares"))
     try:
         done = contender.turn(2 * settings.seconds)
     finally:
@@ -172,12 +126,16 @@ def ratios(rows: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
 def main(settings: Settings) -> None:
     """Time every task, print and write the results."""
     rows: list[dict[str, Any]] = []
+    # before the results are written: the tree is not clean after it
+    facts, left_out = environment(f"python scripts/benchmarks/{command_line()}"), ours()[1]
+    for name, why in left_out.items():
+        print(f"without {name}: {why}")
     for task in settings.tasks:
         with tempfile.TemporaryDirectory() as folder:
             demonstrations(task, Path(folder))
             rows += timed(settings, task, Path(folder))
-    facts = environment(f"python scripts/benchmarks/{command_line()}")
     result = {"rows": rows, "ratios": ratios(rows), "commit": facts["git_commit"], **facts}
+    result |= {"threads": 1, "skipped": left_out}
     settings.out.parent.mkdir(exist_ok=True)
     settings.out.write_text(json.dumps(result, indent=1) + "\n")
     print(json.dumps(result["ratios"], indent=1))

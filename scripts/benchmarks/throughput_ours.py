@@ -30,6 +30,8 @@ from irl.learners.ppo import PPOConfig, PPOLearner
 SETTINGS = json.loads(Path(__file__).with_name("peer_settings.json").read_text())
 ENVS = 8
 EPISODES = 4
+CHUNK = 250
+"""Steps of SAC that are not interrupted."""
 
 
 def peers(method: str, task: str) -> dict[str, Any]:
@@ -86,8 +88,11 @@ def airl(task: str) -> AIRLRun:
 
 
 def dac(task: str, products: str, quantiles: int = 0) -> DACRun:
-    """DAC's defaults; without quantiles its critics are those of the SAC that it is held against."""
-    learner = dataclasses.replace(OFF_POLICY, products=products, quantiles=quantiles)
+    """DAC's defaults; without quantiles its critics are those of the SAC that it is held against.
+
+    Rounds are short, so that a turn ends soon after its time is up.
+    """
+    learner = dataclasses.replace(OFF_POLICY, products=products, quantiles=quantiles, steps_per_round=CHUNK)
     return DACRun(env_id=task, learner=learner)
 
 
@@ -161,7 +166,7 @@ def sb3_sac(task: str) -> Iterator[int]:
         policy_kwargs=shape,
         device="cpu",
     )
-    yield from learned(model, 500)
+    yield from learned(model, CHUNK)
 
 
 def learned(model: PPO | SAC, steps: int) -> Iterator[int]:
@@ -176,14 +181,16 @@ def learned(model: PPO | SAC, steps: int) -> Iterator[int]:
 
 def contender(name: str, task: str, root: Path, shares: dict[str, float] | None) -> tuple[Iterator[int], int]:
     """Its chunks, and how many of them warm it up."""
+    updating = OFF_POLICY.learning_starts // CHUNK + 2
+    defaults = dac(task, OFF_POLICY.products, OFF_POLICY.quantiles)
     made: dict[str, Callable[[], tuple[Iterator[int], int]]] = {
         "gail": lambda: (rounds(gail(task), root, shares), 1),
         "airl": lambda: (rounds(airl(task), root, shares), 1),
-        "dac": lambda: (rounds(dac(task, "bfloat16"), root, shares), 2),
-        "dac-defaults": lambda: (rounds(dac(task, "bfloat16", OFF_POLICY.quantiles), root, shares), 2),
-        "dac-float32": lambda: (rounds(dac(task, "float32"), root, shares), 2),
+        "dac": lambda: (rounds(dac(task, "bfloat16"), root, shares), updating),
+        "dac-defaults": lambda: (rounds(defaults, root, shares), updating),
+        "dac-float32": lambda: (rounds(dac(task, "float32"), root, shares), updating),
         "sb3-ppo": lambda: (sb3_ppo(task), 1),
-        "sb3-sac": lambda: (sb3_sac(task), 4),
+        "sb3-sac": lambda: (sb3_sac(task), updating),
     }
     return made[name]()
 

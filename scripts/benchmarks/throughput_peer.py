@@ -44,8 +44,8 @@ def trajectories(path):
         yield TrajectoryWithRew(obs=obs, acts=action, infos=None, terminal=bool(terminal), rews=reward)
 
 
-def trainer(method, task, demonstrations):
-    """A trainer at the tuned settings of the task."""
+def trainer(method, task, demonstrations, seed=None):
+    """A trainer at the tuned settings of the task; `seed` is given to PPO, which seeds the environments."""
     s = SETTINGS[method][task.split("-")[0]]
     # the wrapper with which its documentation has it keep the learner's trajectories
     venv = DummyVecEnv([lambda: RolloutInfoWrapper(gym.make(task)) for _ in range(ENVS)])
@@ -61,6 +61,7 @@ def trainer(method, task, demonstrations):
             "features_extractor_kwargs": {"normalize_class": RunningNorm},
         },
         device="cpu",
+        seed=seed,
     )
     make, net = (GAIL, BasicRewardNet) if method == "gail" else (AIRL, BasicShapedRewardNet)
     reward_net = net(venv.observation_space, venv.action_space, normalize_input_layer=RunningNorm)
