@@ -27,7 +27,10 @@ DECLARED: dict[str, tuple[str, str]] = {
     ),
     "reward/mean": ("mean of the reward given to the learner, before scaling", "reward"),
     "reward/std": ("its standard deviation over the rollout", "reward"),
-    "reward/scale": ("running standard deviation of its discounted return, which it is divided by", "reward"),
+    "reward/scale": (
+        "running standard deviation of its discounted return, which it is divided by; 1 where it is not",
+        "reward",
+    ),
     "discriminator/loss": (
         "cross-entropy on both classes, or the loss that was chosen, mean over the round; log 4 is blind",
         "nats",

@@ -57,6 +57,8 @@ class PPOConfig:
         "max_grad_norm": 0.5,
         "target_kl": None,
         "activation": "tanh",
+        "reward_scaling": "std",
+        "reward_clip": 0.0,
     }
     n_envs: int = 16
     """Environments stepped side by side."""
@@ -94,12 +96,16 @@ class PPOConfig:
     """Between those layers."""
     log_std_init: float = -0.5
     """Logarithm of the first standard deviation of the actions."""
+    reward_scaling: Literal["std", "none"] = "std"
+    """What rewards are divided by: the running deviation of their discounted return, or nothing."""
+    reward_clip: float = 0.0
+    """Bound of a reward after that; 0: none. What is saved is the reward before both."""
     average: float = 0.0
     """Decay a round of the moving average of weights that is exported; 0 exports the newest."""
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "n_epochs")
-        check_at_least(self, 0, "lr", "clip_range", "vf_coef", "max_grad_norm")
+        check_at_least(self, 0, "lr", "clip_range", "vf_coef", "max_grad_norm", "reward_clip")
         for name in ("clip_range_vf", "target_kl"):
             if (value := getattr(self, name)) is not None and value <= 0.0:
                 raise ValueError(f"{name} must be above 0, or None, not {value}")
@@ -136,7 +142,8 @@ class PPOLearner(Rollouts):
         self.config, self.env_id, self.total_steps = config, env_id, total_steps
         self.venv = RecordingVecEnv(env_id, env_seeds, env_kwargs)
         self._running = normaliser is None
-        self._scale = ReturnScale(config.n_envs, config.gamma)
+        scaled = config.reward_scaling == "std"
+        self._scale = ReturnScale(config.n_envs, config.gamma, scaled=scaled, clip=config.reward_clip)
         self.model = PPO(
             "MlpPolicy",
             self.venv,

@@ -93,7 +93,7 @@ def give_rewards(
 ) -> Float[np.ndarray, "T N"]:
     """Reward the model's rollout buffer, whose steps `batch` are, and compute its advantages anew.
 
-        r'_t = r_t / std(G) + [truncated at t] gamma V(s_{t+1})
+        r'_t = clip(r_t / std(G)) + [truncated at t] gamma V(s_{t+1})
 
     Returns the rewards before their scaling, which moves `scale` on.
 
@@ -106,7 +106,7 @@ def give_rewards(
     raw = given.double().cpu().numpy().reshape(shape)
     ended = (batch.terminated | batch.truncated).cpu().numpy().reshape(shape)
     scale.update(raw, ended)
-    buffer.rewards[:] = raw / scale.std
+    buffer.rewards[:] = scale(raw)
     cut_off = batch.truncated & ~batch.terminated
     if bool(cut_off.any()):
         values = model.policy.predict_values(batch.next_obs[cut_off].to(model.device))

@@ -45,6 +45,7 @@ from irl.learners.sac_update import SACUpdate
 from irl.learners.vec import RecordingVecEnv
 from irl.policies import densities
 from irl.policies.policy import Policy, PolicySpec
+from irl.rewards.normalise import DrawnScale
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,8 @@ class SACConfig:
         "quantiles": 0,
         "dropped_quantiles": 2,
         "products": "float32",
+        "reward_scaling": "none",
+        "reward_clip": 0.0,
     }
     n_envs: int = 1
     """Environments stepped at once."""
@@ -106,6 +109,10 @@ class SACConfig:
     products: Literal["float32", "bfloat16"] = "float32"
     """Number format of hidden layers' products. bfloat16 is faster where the CPU has it, and rounds to
     three digits: results differ from float32's, and what that does to a return is not measured yet."""
+    reward_scaling: Literal["none", "std"] = "none"
+    """What rewards are divided by: nothing, or the running deviation of all that were drawn."""
+    reward_clip: float = 0.0
+    """Bound of a reward after that; 0: none. What is saved is the reward before both."""
     average: float = 0.0
     """Decay a round of the moving average of weights that is exported; 0 exports the newest."""
 
@@ -114,7 +121,7 @@ class SACConfig:
         check_at_least(self, 1, "target_update_interval", "n_critics")
         _check_number_or_auto("ent_coef", self.ent_coef, self.ent_coef.removeprefix("auto_"), 0.0)
         _check_number_or_auto("target_entropy", self.target_entropy, self.target_entropy, -math.inf)
-        check_at_least(self, 0, "learning_starts", "lr", "tau", "updates_per_step")
+        check_at_least(self, 0, "learning_starts", "lr", "tau", "updates_per_step", "reward_clip")
         check_at_least(self, 0, "quantiles", "dropped_quantiles")
         if self.quantiles and self.dropped_quantiles >= self.quantiles:
             raise ValueError(
@@ -172,6 +179,7 @@ class SACLearner:
         self.replay = Replay(capacity, config.n_envs, obs_size, len(self._low), device)
         self._average = WeightAverage(_actor_weights(self.model.actor), config.average)
         self._rate = learning_rate(config.lr, config.lr_schedule)
+        self._scale = DrawnScale(scaled=config.reward_scaling == "std", clip=config.reward_clip)
         self._env_steps, self._owed = 0, 0.0
         self.venv.reset()
 
@@ -219,8 +227,8 @@ class SACLearner:
 
     @property
     def reward_scale(self) -> float:
-        """Rewards reach SAC as they are."""
-        return 1.0
+        """What the reward is divided by before SAC sees it."""
+        return self._scale.std
 
     def take_finished(self) -> list[tuple[float, int]]:
         """Return (the environment's own) and length of each episode that ended since the last call."""
@@ -271,6 +279,7 @@ class SACLearner:
         with torch.no_grad():
             reward = self._reward(batch).float()
         check_finite({"reward of a drawn batch": reward})
+        reward = self._scale(reward)
         remaining = 1.0 - self._env_steps / self._total_steps
         self._update(batch, reward, self._rate(remaining) if callable(self._rate) else self._rate)
 
@@ -323,6 +332,7 @@ class SACLearner:
             "steps": (self._env_steps, self._owed, self._update.updates),
             "last_obs": self.venv.obs,
             "replay": self.replay.state_dict(),
+            "scale": self._scale.state_dict(),
             "average": self._average.state_dict(),
             "environments": self.venv.state_dict(),
             "rng": self._rng.get_state(),
@@ -340,6 +350,8 @@ class SACLearner:
         self._env_steps, self._owed, self._update.updates = state["steps"]
         self.replay.load_state_dict(state["replay"])
         self._average.load_state_dict(state["average"])
+        # checkpoints of before there was one have none
+        self._scale.load_state_dict(state.get("scale", (0.0, 0.0, 0.0)))
         self.venv.load_state_dict(state["environments"])
         self.venv.resume_from(state["last_obs"])
         self._rng.set_state(state["rng"])

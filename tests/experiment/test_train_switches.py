@@ -59,3 +59,22 @@ def test_what_is_refused_is_one_line_with_the_reason(irl: Command, capsys: pytes
         irl("train", "airl", *WORDS, "--discriminator.loss=wasserstein", "--out", "run")
     assert "AIRL has no loss wasserstein: log pi falls out" in capsys.readouterr().err
     assert not Path("run").exists()
+
+
+def test_the_scale_and_the_bound_of_rewards_reach_the_learner_and_not_the_saved_reward(irl: Command) -> None:
+    off = ("--learner.reward-scaling=none", "--learner.reward-clip=0.1")
+    for out, more in (("on", ()), ("off", off)):
+        irl("train", "gail", *WORDS, *more, "--out", out)
+    scales = [load_reward(out).spec.reward_scale for out in ("on", "off")]
+    assert scales[0] != 1.0
+    assert scales[1] == 1.0
+    sac = "--steps=32 --learner.steps-per-round=16 --learner.learning-starts=4 --learner.batch-size=4"
+    quick = "--learner.quantiles=0 --learner.hidden=8 --learner.products=float32 --watch.eval-episodes=0"
+    scaled = ("--learner.reward-scaling=std", "--demo-episodes=2", "--watch.checkpoint-every-s=0")
+    irl("train", "dac", "--env-id", TASK, "--out", "dac", *sac.split(), *quick.split(), *scaled)
+    assert load_reward("dac").spec.reward_scale != 1.0
+    before = (last("dac") / "policy.safetensors").read_bytes()
+    newest = list(open_run(Path("dac")).checkpoints().values())[-1]
+    (newest / "state.safetensors").write_bytes(b"torn")
+    irl("train", "--resume", "dac")
+    assert (last("dac") / "policy.safetensors").read_bytes() == before

@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
 from irl.core import state
 from irl.core.rng import stream
-from irl.rewards.normalise import ReturnScale
+from irl.rewards.normalise import DrawnScale, ReturnScale
 
 
 def slow_returns(reward: np.ndarray, done: np.ndarray, gamma: float) -> list[float]:
@@ -101,3 +102,32 @@ def test_it_goes_on_where_it_was(tmp_path) -> None:
         assert other.std != scale.std
         other.update(*second)
         assert other.std == scale.std
+
+
+def test_without_a_scale_the_deviation_counts_as_one_and_a_bound_is_after_the_scale() -> None:
+    reward, done = rollout(0, 50, 2)
+    plain, bounded = ReturnScale(2, 0.9, scaled=False), ReturnScale(2, 0.9, clip=0.5)
+    for scale in (plain, bounded):
+        scale.update(reward, done)
+    assert plain.std == 1.0
+    assert np.array_equal(plain(reward), reward)
+    assert np.array_equal(bounded(reward), np.clip(reward / bounded.std, -0.5, 0.5))
+
+
+def test_the_deviation_of_drawn_rewards_is_that_of_all_of_them_and_goes_on() -> None:
+    drawn = torch.randn(7, 20, generator=torch.Generator().manual_seed(0)) * 3.0 + 5.0
+    scale, off = DrawnScale(scaled=True, clip=0.0), DrawnScale(scaled=False, clip=2.0)
+    given = [scale(batch) for batch in drawn][-1]
+    assert scale.std == pytest.approx(float(drawn.double().std(correction=0)))
+    torch.testing.assert_close(given, drawn[-1] / scale.std)
+    other = DrawnScale(scaled=True, clip=0.0)
+    other.load_state_dict(scale.state_dict())
+    assert torch.equal(other(drawn[0]), scale(drawn[0]))
+    assert torch.equal(off(drawn[0]), drawn[0].clamp(-2.0, 2.0))
+    assert off.std == 1.0
+
+
+def test_equal_and_single_rewards_are_left_as_they_are() -> None:
+    scale = DrawnScale(scaled=True, clip=0.0)
+    assert torch.equal(scale(torch.full((1,), 4.0)), torch.full((1,), 4.0))
+    assert torch.equal(scale(torch.full((3,), 4.0)), torch.full((3,), 4.0))
