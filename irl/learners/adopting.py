@@ -18,9 +18,11 @@ def adopt(weights: Mapping[str, Tensor], policy: Policy) -> None:
         ValueError: the policy's layers are of other sizes.
     """
     for name, weight in weights.items():
-        given = torch.from_numpy(policy.weights[name]) if name in policy.weights else None
-        if given is None or given.ndim != weight.ndim or given.shape[:1] != weight.shape[:1]:
-            found = None if given is None else tuple(given.shape)
+        given = torch.from_numpy(policy.weights[name]) if name in policy.weights else torch.zeros(0, 0)
+        # the indicator of the absorbing state is the last input
+        narrower = weight[:, :-1] if name == "layers.0.weight" else weight
+        into = next((part for part in (weight, narrower) if part.shape == given.shape), None)
+        if into is None:
+            found = tuple(given.shape) if name in policy.weights else "none"
             raise ValueError(f"{name}: the learner has {tuple(weight.shape)}, the policy {found}")
-        into = weight[:, : given.shape[1]] if weight.ndim == 2 else weight
         into.copy_(given)
