@@ -17,6 +17,7 @@ metadata = importlib.metadata.distribution("irl")
 print(json.dumps({
     "irl": irl.__file__,
     "typed": files.joinpath("py.typed").is_file(),
+    "page": [files.joinpath("report", name).is_file() for name in ("page.css", "page.js")],
     "version": metadata.version,
     "scripts": {e.name: e.value for e in metadata.entry_points if e.group == "console_scripts"},
 }))
@@ -63,6 +64,7 @@ def test_the_wheel_works_in_an_empty_folder(installed, tmp_path):
     found = json.loads(run(sys.executable, "-c", LOOK, cwd=tmp_path, PYTHONPATH=str(installed)))
     assert Path(found["irl"]) == installed / "irl" / "__init__.py"
     assert found["typed"]
+    assert found["page"] == [True, True]
     assert found["version"] == "0.1.0"
     assert found["scripts"] == {"irl": "irl.experiment.cli:main"}
 

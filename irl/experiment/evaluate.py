@@ -21,6 +21,7 @@ from irl.core.rng import episode_seeds
 from irl.core.types import Episode
 from irl.envs.make import make
 from irl.envs.rollouts import rollouts
+from irl.experiment.boarded import board
 from irl.experiment.cloned import evaluation_of_cloned
 from irl.experiment.configs import BCRun, FromDemonstrations
 from irl.experiment.draw import drawn_again
@@ -85,6 +86,7 @@ def evaluate(command: Evaluate) -> None:
     began = time.monotonic()
     result = evaluation(folder, command)
     files.write_json(target, result)
+    board(folder.path, result["drift"])
     report = write_report(folder.path)
     console = Console()
     console.print(evaluation_table(result))

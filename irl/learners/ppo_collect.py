@@ -17,7 +17,6 @@ from stable_baselines3 import PPO
 from torch import Tensor, nn
 
 from irl.core.flat import linear_layers
-from irl.core.phi import PHI
 from irl.learners import ppo_losses as losses
 from irl.learners.features import NormalisedFeatures
 from irl.learners.vec import RecordingVecEnv
@@ -57,7 +56,8 @@ def _means(model: PPO, activation: str) -> Callable[[Tensor], Tensor]:
     assert isinstance(extractor, NormalisedFeatures)
     assert isinstance(head, nn.Linear)
     layers = [(m.weight, m.bias) for m in linear_layers(model.policy.mlp_extractor.policy_net)]
-    normaliser, act = extractor.normaliser, PHI[activation][0]
+    # torch's own tanh: that of `core.phi` differs from SB3's in its last bit
+    normaliser, act = extractor.normaliser, torch.tanh_ if activation == "tanh" else torch.relu_
     mean, std, clip = normaliser.mean, normaliser.std, normaliser.clip
 
     def means(obs: Tensor) -> Tensor:

@@ -24,7 +24,7 @@ def iqm(values: Float[np.ndarray, "*D N"]) -> Float[np.ndarray, "*D"]:
     n = values.shape[-1]
     edge = np.arange(n + 1) / n
     weight = np.clip(np.minimum(edge[1:], 0.75) - np.maximum(edge[:-1], 0.25), 0.0, None)
-    return np.sum(np.sort(values, axis=-1) * weight, axis=-1) / np.sum(weight)
+    return np.asarray(np.sum(np.sort(values, axis=-1) * weight, axis=-1) / np.sum(weight))
 
 
 def interval(values: Sequence[float]) -> tuple[float, float] | None:

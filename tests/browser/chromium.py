@@ -25,7 +25,7 @@ FLAGS = (
     "--disable-sync",
     "--remote-debugging-port=0",
 )
-STARTS_S, ANSWERS_S = 60.0, 60.0
+STARTS_S, ANSWERS_S = 90.0, 120.0
 
 
 class Tab:
@@ -68,7 +68,9 @@ class Tab:
         """Bring every figure into sight once, as a reader would."""
         self.run(
             "(async () => { for (const f of document.querySelectorAll('figure.plot')) {"
-            "f.scrollIntoView(); await new Promise((r) => setTimeout(r, 60)); } scrollTo(0, 0); })()"
+            "if (!f.offsetParent) continue; f.scrollIntoView(); const late = Date.now() + 20000;"
+            "while (!f.dataset.drawn && Date.now() < late) await new Promise((r) => setTimeout(r, 20));"
+            "} scrollTo(0, 0); })()"
         )
 
     def look(self, scheme: str, width: int, height: int) -> None:

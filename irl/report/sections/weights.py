@@ -31,7 +31,7 @@ def weights(run: RunFiles) -> Panel:
     over = lookup(run.evaluation, "drift.pictures.terms")
     views = ()
     if isinstance(over, Mapping) and isinstance(steps := over.get("snapshots"), list) and _whole(over, steps):
-        views = one(figure(over, steps))
+        views = one(figure(over, [float(step) for step in steps]))
     tables = tuple(table for table in (_table(run, known), _residual(run)) if table is not None)
     return Panel(anchor, title, text, "terms", views, tables=tables, notes=_notes(run))
 
