@@ -11,18 +11,17 @@ from typing import Any
 import numpy as np
 
 from irl.core.types import Episode, from_episodes
-from irl.diagnostics.stack import read
+from irl.diagnostics.stack import Given, read
 from irl.envs.film import film
 from irl.envs.make import make
 from irl.experiment.judge import finite
 from irl.experiment.pictured import rounded
-from irl.rewards.learned import LearnedReward
 
 FOLDER = "episodes"
 
 
 def record(
-    run: Path, env_id: str, episodes: Sequence[Episode], reward: LearnedReward, frames: int
+    run: Path, env_id: str, episodes: Sequence[Episode], reward: Given, frames: int
 ) -> list[dict[str, Any]]:
     """The episode in the middle by its return, and the worst where that is another one.
 
@@ -40,7 +39,7 @@ def record(
     ]
 
 
-def _traces(name: str, episode: Episode, reward: LearnedReward, dt: float | None) -> dict[str, Any]:
+def _traces(name: str, episode: Episode, reward: Given, dt: float | None) -> dict[str, Any]:
     return {
         "name": name,
         "seed": episode.seed,

@@ -27,7 +27,7 @@ def learned(batch: object) -> torch.Tensor:
 
 def test_the_episode_in_the_middle_and_the_worst_are_taken(tmp_path: Path) -> None:
     episodes = [episode(3.0, 1), episode(9.0, 2), episode(1.0, 3)]
-    middle, worst = filmed.record(tmp_path, "PointMass-v0", episodes, learned, 0)  # pyright: ignore[reportArgumentType]
+    middle, worst = filmed.record(tmp_path, "PointMass-v0", episodes, learned, 0)
     assert (middle["name"], middle["seed"], middle["return"]) == ("middle", 1, 3.0)
     assert (worst["name"], worst["seed"]) == ("worst", 3)
     assert middle["learned"] == [0.5, 0.25]
@@ -37,7 +37,7 @@ def test_the_episode_in_the_middle_and_the_worst_are_taken(tmp_path: Path) -> No
 
 
 def test_one_episode_is_both(tmp_path: Path) -> None:
-    assert len(filmed.record(tmp_path, "PointMass-v0", [episode(3.0)], learned, 0)) == 1  # pyright: ignore[reportArgumentType]
+    assert len(filmed.record(tmp_path, "PointMass-v0", [episode(3.0)], learned, 0)) == 1
 
 
 def test_a_task_that_draws_nothing_is_said_to(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def test_the_page_stands_alone(run: Path) -> None:
     assert "<script src" not in page
     assert "<link" not in page
     assert "default-src 'none'" in page
-    assert page.count('<figure class="plot"') == 6
+    assert page.count('<figure class="plot"') == 5
     assert [path.name for path in run.iterdir() if path.name.startswith(".")] == []
 
 
@@ -88,7 +88,7 @@ def test_a_task_without_a_hand_written_reward_says_so(run: Path, evaluation: dic
         stratum["hand_written_mean"] = None
     page = _change(run, evaluation)
     assert "Not shown: this task has no hand-written reward." in page
-    assert page.count('<figure class="plot"') == 5
+    assert page.count('<figure class="plot"') == 4
 
 
 def test_a_run_without_snapshots_says_so(run: Path, evaluation: dict[str, Any]) -> None:
@@ -127,7 +127,7 @@ def test_any_part_of_the_evaluation_may_be_missing(
     files = read_run(run)
     files = dataclasses.replace(files, metrics=files.metrics[:10])
     evaluation["reward"]["scatter"] = {k: v[::100] for k, v in evaluation["reward"]["scatter"].items()}
-    for path in _holes(evaluation)[1:]:
+    for path in _holes(evaluation)[1::3]:
         holed = json.loads(json.dumps(evaluation))
         parent = holed
         for key in path[:-1]:
