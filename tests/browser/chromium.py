@@ -57,6 +57,7 @@ class Tab:
 
     def open(self, page: Path) -> float:
         """Seconds until the page was there with all its scripts run."""
+        self.events.clear()
         began = monotonic()
         self.call("Page.navigate", url=page.resolve().as_uri())
         while not self.run("document.readyState === 'complete' && document.body.dataset.ready === 'yes'"):

@@ -11,20 +11,22 @@ import pytest
 from irl.report.html import NAMES, write_report, write_reports
 from tests.browser.chromium import Tab, chromium
 from tests.report import whole
-from tests.report.conftest import evaluation, run  # noqa: F401
+from tests.report.conftest import a_run, an_evaluation
 
 pytestmark = pytest.mark.browser
 SNAPSHOTS = 50
 
 
-@pytest.fixture
-def page(run: Path, evaluation: dict) -> Path:  # noqa: F811
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of a run with fifty snapshots of which everything is known."""
+    evaluation = an_evaluation()
+    run = a_run(tmp_path_factory.mktemp("browser"), evaluation)
     whole.write(run, whole.grow(evaluation, SNAPSHOTS))
     return write_report(run)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def tab() -> Iterator[Tab]:
     with chromium() as opened:
         yield opened

@@ -18,6 +18,17 @@ N = 600
 @pytest.fixture
 def evaluation() -> dict[str, Any]:
     """evaluation.json of a run that went well."""
+    return an_evaluation()
+
+
+@pytest.fixture
+def run(tmp_path: Path, evaluation: dict[str, Any]) -> Path:
+    """A run folder with every file that a report reads."""
+    return a_run(tmp_path, evaluation)
+
+
+def an_evaluation() -> dict[str, Any]:
+    """The content of an evaluation.json."""
     rng = stream(0, "evaluation")
     true = {
         "expert": rng.normal(3.2, 0.5, N),
@@ -78,10 +89,9 @@ def evaluation() -> dict[str, Any]:
     }
 
 
-@pytest.fixture
-def run(tmp_path: Path, evaluation: dict[str, Any]) -> Path:
-    """A run folder with every file that a report reads."""
-    folder = tmp_path / "quickstart"
+def a_run(place: Path, evaluation: dict[str, Any]) -> Path:
+    """A run folder within `place`."""
+    folder = place / "quickstart"
     folder.mkdir()
     config = {
         "kind": "gail",
