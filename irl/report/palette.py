@@ -4,6 +4,8 @@ The strata keep one colour in all figures. The hues were chosen to stay apart un
 colour blindnesses and to have a contrast of 3 or more on the light and the dark page.
 """
 
+from typing import Any
+
 import plotly.graph_objects as go
 
 STRATA = {"expert": "#2f7fc1", "policy": "#d9730d", "random": "#7d8590"}
@@ -46,31 +48,30 @@ def faded(colour: str, alpha: float) -> str:
     return f"rgba({red},{green},{blue},{alpha:g})"
 
 
+AXIS: dict[str, Any] = {
+    "gridcolor": GRID,
+    "linecolor": INK,
+    "zeroline": False,
+    "automargin": True,
+    "ticks": "outside",
+    "tickcolor": GRID,
+}
+LAYOUT: dict[str, Any] = {
+    "template": {},
+    "margin": {"l": 10, "r": 14, "t": 10, "b": 10},
+    "paper_bgcolor": "rgba(0,0,0,0)",
+    "plot_bgcolor": "rgba(0,0,0,0)",
+    "font": {"family": FONT, "size": 13, "color": INK},
+    "legend": {"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"},
+    "hoverlabel": {"bgcolor": "#ffffff", "bordercolor": INK, "font": {"color": "#1a1a1a"}},
+    # a finger on a figure scrolls the page
+    "dragmode": False,
+}
+
+
 def framed(figure: go.Figure, x: str, y: str, height: int = 380) -> go.Figure:
     """The figure with axis titles, a legend above it and no background of its own."""
-    axis = {
-        "gridcolor": GRID,
-        "linecolor": INK,
-        "zeroline": False,
-        "automargin": True,
-        "title": {"standoff": 10, "font": {"size": 13}},
-        "ticks": "outside",
-        "tickcolor": GRID,
-    }
-    figure.update_xaxes(**axis, showgrid=False, showline=True)
-    figure.update_yaxes(**axis)
-    figure.update_xaxes(title_text=x)
-    figure.update_yaxes(title_text=y)
-    figure.update_layout(
-        template=go.layout.Template(),
-        height=height,
-        margin={"l": 10, "r": 14, "t": 10, "b": 10},
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
-        font={"family": FONT, "size": 13, "color": INK},
-        legend={"orientation": "h", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"},
-        hoverlabel={"bgcolor": "#ffffff", "bordercolor": INK, "font": {"color": "#1a1a1a"}},
-        # a finger on a figure scrolls the page
-        dragmode=False,
-    )
-    return figure
+    title = {"standoff": 10, "font": {"size": 13}}
+    figure.update_xaxes(**AXIS, showgrid=False, showline=True, title={**title, "text": x})
+    figure.update_yaxes(**AXIS, title={**title, "text": y})
+    return figure.update_layout(**LAYOUT, height=height)

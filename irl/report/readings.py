@@ -46,7 +46,8 @@ def headline(evaluation: Mapping[str, Any]) -> str:
         parts.append(f"The policy gets {percent(score)} of the way from a random policy to the expert.")
     elif mean is not None:
         parts.append(f"The policy returns {amount(mean)} an episode.")
-    if pearson is not None:
+    # step by step shaping counts, so where the distance that forgives it is known it is said instead
+    if pearson is not None and number(evaluation, "distances.headline.value") is None:
         parts.append(f"Step by step, the learned reward {_agreement(pearson)} (Pearson {pearson:.2f}).")
     if not parts:
         reason = why_missing(evaluation, "policy.return_mean").rstrip(".")

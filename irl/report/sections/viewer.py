@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from irl.report.folder import RunFiles, finite, lookup
 from irl.report.markup import controlled, drawing, embedded
-from irl.report.palette import ACCENT, INK, OTHERS, framed
+from irl.report.palette import ACCENT, AXIS, INK, LAYOUT, OTHERS
 from irl.report.panel import Panel, plain, unmeasured
 from irl.report.readings import amount
 
@@ -49,29 +48,42 @@ def traces(row: Mapping[str, Any]) -> dict[str, list[float | None]]:
 
 
 def figure(series: Mapping[str, Sequence[float | None]], dt: float | None) -> go.Figure:
-    """A row a trace, each with its own scale, over the same steps."""
-    drawn = make_subplots(rows=len(series), cols=1, shared_xaxes=True, vertical_spacing=0.03)
-    colours = [ACCENT, INK, *OTHERS]
+    """A row a trace, each with its own scale, over one axis of steps."""
+    colours, n = [ACCENT, INK, *OTHERS], len(series)
+    traces, axes = [], {}
     for i, (name, values) in enumerate(series.items()):
-        drawn.add_scatter(
-            x=list(range(len(values))),
-            y=list(values),
-            mode="lines",
-            name=plain(name),
-            showlegend=False,
-            line={"color": colours[i % len(colours)], "width": 1.6},
-            hovertemplate="%{y:.4g}",
-            row=i + 1,
-            col=1,
-        )
-    framed(drawn, "", "", height=ROW * len(series) + 60)
-    for i, name in enumerate(series):
-        drawn.update_yaxes(
-            title={"text": plain(name), "font": {"size": 11}, "standoff": 4}, nticks=3, row=i + 1, col=1
+        number = "" if i == 0 else str(i + 1)
+        title = {"text": plain(name), "font": {"size": 11}, "standoff": 4}
+        # the first trace on top
+        domain = [1 - (i + 0.86) / n, 1 - i / n]
+        axes[f"yaxis{number}"] = {**AXIS, "title": title, "nticks": 3, "domain": domain}
+        line = {"color": colours[i % len(colours)], "width": 1.6}
+        look = {"mode": "lines", "name": plain(name), "line": line, "hovertemplate": "%{y:.4g}"}
+        traces.append(
+            {
+                "type": "scatter",
+                "x": list(range(len(values))),
+                "y": list(values),
+                "yaxis": f"y{number}",
+                **look,
+            }
         )
     seconds = "" if dt is None else f" ({dt:.3g} s)"
-    drawn.update_xaxes(title_text=f"step{seconds}", row=len(series), col=1)
-    return drawn.update_layout(hovermode="x", meta={"cursor": True})
+    bottom = {
+        "title_text": f"step{seconds}",
+        "anchor": "y" if n == 1 else f"y{n}",
+        "showline": True,
+        "showgrid": False,
+    }
+    # written at once: a call an axis would take most of the page's time
+    layout = {
+        "xaxis": {**AXIS, **bottom},
+        **axes,
+        "showlegend": False,
+        "hovermode": "x",
+        "meta": {"cursor": True},
+    }
+    return go.Figure({"data": traces, "layout": {**LAYOUT, **layout, "height": ROW * n + 60}})
 
 
 def _episode(run: Path, row: Mapping[str, Any], name: str, pictures: bool) -> str:
