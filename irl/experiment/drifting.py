@@ -80,6 +80,7 @@ def judge_snapshots(
         healths.append(_health(snapshot, played, played.fresh[at]))
         tick(f"discriminator at {at}")
     parts, asked = _parts(snapshots, steps)
+    last = from_episodes(list(played.fresh[max(snapshots)]))
     terminated, covered = steps.batch.terminated.numpy(), coverage(steps.batch)
     return {
         **found,
@@ -90,7 +91,9 @@ def judge_snapshots(
         "parts": parts,
         "normaliser": _normaliser(snapshots, steps),
         "outside": [finite(covered.outside(from_episodes(list(played.fresh[at])))) for at in snapshots],
-        "pictures": pictures(left, base, list(snapshots), _of_the_last(snapshots, played), found["n"], seed),
+        "pictures": pictures(
+            left, base, {at: s.reward for at, s in snapshots.items()}, last, found["n"], seed
+        ),
         "cost": {"rewards": len(steps.batch) * (len(snapshots) + asked)},
     }
 
@@ -133,12 +136,6 @@ def _health(snapshot: Snapshot, played: Played, fresh: Sequence[Episode]) -> dic
     found["slope_p99"] = finite(float(np.quantile(slopes, 0.99)))
     found["label_prior"] = 0.5
     return found
-
-
-def _of_the_last(snapshots: Mapping[int, Snapshot], played: Played) -> Float[np.ndarray, "F S"]:
-    """Every snapshot's reward on the same steps of the last one's policy."""
-    steps = from_episodes(list(played.fresh[max(snapshots)]))
-    return np.column_stack([read(snapshot.reward, steps) for snapshot in snapshots.values()])
 
 
 def _logits(snapshot: Snapshot, batch: Transitions) -> Float[np.ndarray, "B"]:

@@ -17,10 +17,10 @@ from jaxtyping import Float
 
 from irl.algorithms.probe_set import ProbeSet
 from irl.core.rng import stream
-from irl.core.types import Episode
+from irl.core.types import Episode, Transitions
 from irl.diagnostics import val
 from irl.diagnostics.segments import segments
-from irl.diagnostics.stack import Stack
+from irl.diagnostics.stack import Given, Stack, read
 from irl.diagnostics.terms import attribute
 from irl.diagnostics.trajectory import trajectory
 from irl.experiment.against import against, residuals
@@ -38,8 +38,8 @@ DIGITS = 5
 def pictures(
     left: val.Canonical,
     base: ProbeSet,
-    at: Sequence[int],
-    final: Float[np.ndarray, "F S"],
+    snapshots: Mapping[int, Given],
+    last: Transitions,
     n: int,
     seed: int,
 ) -> dict[str, Any]:
@@ -47,15 +47,16 @@ def pictures(
 
     Args:
         left: the hand-written reward first, then the snapshots'.
-        at: the step of each snapshot.
-        final: each snapshot's reward on steps of the final policy.
+        snapshots: the reward of each, by step.
+        last: steps of the last snapshot's policy.
         n: length of the segments that the rewards are held against each other on.
     """
-    of = left.columns
+    of, at = left.columns, list(snapshots)
+    final = np.column_stack([read(reward, last) for reward in snapshots.values()])
     rewards = of.raw[:, 1 : 1 + of.asked]
     truth = of.raw[:, 0] if np.all(np.isfinite(of.raw[:, 0])) else None
     return {
-        "snapshots": list(at),
+        "snapshots": at,
         "fan": _fan(rewards, of.steps, final),
         "maps": [_map(left, m) for m in val.CURVE],
         "terms": _terms(rewards, of.steps, base, at, of.gamma, seed),

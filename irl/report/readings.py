@@ -160,13 +160,12 @@ def _distance(evaluation: Mapping[str, Any]) -> KeyNumber:
     value, low, high = (number(evaluation, f"{path}.{key}") for key in ("value", "low", "high"))
     if value is None:
         return _missing(evaluation, name, path)
-    shown = f"{value:.3f}" + ("" if low is None or high is None else f" ({low:.3f} to {high:.3f})")
+    shown = f"{value:.3f}" if low is None or high is None else f"{value:.3f} ({low:.3f} to {high:.3f})"
     ends = (("own error", "self_error"), ("a random network", "random"))
     known = [
         f"{words} {n:.3f}" for words, key in ends if (n := number(evaluation, f"{path}.{key}")) is not None
     ]
-    reading = "VAL, shaping and scale forgiven: 0 is the same, 1 the opposite"
-    return KeyNumber(name, shown, "; ".join([reading, *known]) + ".")
+    return KeyNumber(name, shown, "; ".join(["VAL: 0 is the same, 1 the opposite", *known]) + ".")
 
 
 def _auroc(evaluation: Mapping[str, Any]) -> KeyNumber:

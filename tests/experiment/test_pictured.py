@@ -40,7 +40,8 @@ def found() -> dict[str, Any]:
     noise = stream(0, "noise").normal(size=len(hand_written))
     rewards = np.column_stack([noise, 3.0 * hand_written + 1.0])
     of = compare.columns(hand_written, rewards, steps, 0.99, 0)
-    return pictures(val.canonical(of, 0), base, [0, 100], rewards[:50], 10, 0)
+    asked = {0: lambda batch: batch.obs[:, 0], 100: lambda batch: batch.obs[:, 1]}
+    return pictures(val.canonical(of, 0), base, asked, steps.batch, 10, 0)
 
 
 def test_the_map_has_the_truth_at_its_end(found: dict[str, Any]) -> None:

@@ -70,7 +70,7 @@ def figure(series: Mapping[str, Sequence[float | None]], dt: float | None) -> go
         )
     seconds = "" if dt is None else f" ({dt:.3g} s)"
     bottom = {
-        "title_text": f"step{seconds}",
+        "title": {"text": f"step{seconds}", "font": {"size": 13}},
         "anchor": "y" if n == 1 else f"y{n}",
         "showline": True,
         "showgrid": False,
