@@ -87,6 +87,9 @@ def iqm(values: Float[np.ndarray, "N"]) -> float:
 
     NaN where there is none or one of them is not finite.
 
+    >>> iqm(np.array([0.0, 1.0, 3.0, 100.0]))
+    2.0
+
     Source: Agarwal et al. (2021), arXiv:2108.13264.
     """
     if len(values) == 0 or not np.all(np.isfinite(values)):

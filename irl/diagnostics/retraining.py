@@ -17,21 +17,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import trim_mean
 
+from irl.core.statistics import iqm
 from irl.diagnostics.bootstrap import DRAWS, interval
 from irl.diagnostics.crossplay import Estimate
 
 Returns = Float[np.ndarray, "_"]
-
-
-def iqm(values: Returns) -> float:
-    """Mean of what is left once the lowest and the highest quarter are taken away.
-
-    >>> iqm(np.array([0.0, 1.0, 3.0, 100.0]))
-    2.0
-    """
-    return float(trim_mean(values, 0.25))
 
 
 def retrain_ratio(

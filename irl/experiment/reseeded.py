@@ -18,7 +18,8 @@ from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.records import RunFolder, open_run
 from irl.core.rng import episode_seeds, stream
-from irl.diagnostics.retraining import iqm, retrain_ratio
+from irl.core.statistics import iqm
+from irl.diagnostics.retraining import retrain_ratio
 from irl.envs.make import check_module
 from irl.envs.names import split_name
 from irl.envs.rollouts import rollouts

@@ -104,7 +104,7 @@ HOW: dict[str, tuple[str, str]] = {
         "Several runs",
         "The interquartile mean leaves the highest and the lowest quarter of the seeds out; its interval is "
         "of seeds drawn again, 2,000 times. With fewer than five seeds it says little. Curves are "
-        "interpolated to common steps. Source code: irl/report/seeds.py.",
+        "interpolated to common steps. Source code: irl/core/statistics.py.",
     ),
 }
 

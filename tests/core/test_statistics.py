@@ -88,7 +88,10 @@ def test_constant_means_up_to_the_rounding_of_a_sum() -> None:
 
 def test_the_interquartile_mean_cuts_whole_values_off_both_ends() -> None:
     assert iqm(np.array([9.0, 1.0, 2.0, -50.0])) == 1.5
+    assert iqm(np.array([9.0, 1.0, 0.0, 2.0])) == 1.5
     assert iqm(np.array([3.0, 4.0, 5.0])) == 4.0
+    assert iqm(np.array([1.0])) == 1.0
+    assert iqm(np.array([0.0, 4.0])) == 2.0
     assert iqm(np.arange(8.0)) == trim_mean(np.arange(8.0), 0.25)
     assert math.isnan(iqm(np.array([])))
     assert math.isnan(iqm(np.array([1.0, np.inf])))
@@ -103,3 +106,5 @@ def test_its_interval_lies_around_it_and_one_value_has_none() -> None:
     assert low < iqm(values) < high
     assert all(math.isnan(end) for end in iqm_interval(np.array([1.0]), rng))
     assert iqm_interval(np.array([2.0, 2.0]), rng) == (2.0, 2.0)
+    low, high = iqm_interval(np.array([0.2, 0.4, 0.6, 0.8, 1.0]), rng)
+    assert 0.2 <= low < 0.6 < high <= 1.0

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from irl.diagnostics.retraining import iqm, retrain_ratio
+from irl.core.statistics import iqm
+from irl.diagnostics.retraining import retrain_ratio
 
 
 def test_the_ratio_is_of_what_lies_above_random() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from irl.core import files
 from irl.core.errors import UserError
-from irl.diagnostics.retraining import iqm
+from irl.core.statistics import iqm
 from irl.experiment.configs import GAILRun
 from irl.experiment.retrain import Retrain, settled
 from tests.experiment.conftest import TASK

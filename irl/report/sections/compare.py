@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from irl.report import seeds
+from irl.core.rng import stream
+from irl.core.statistics import iqm, iqm_interval
 from irl.report.folder import RunFiles, column, finite, lookup, number
 from irl.report.palette import INK, METHODS, OTHERS, faded, framed
 from irl.report.panel import Cell, Panel, Table, View, absent, plain
@@ -85,7 +86,7 @@ def mean_of(curves: Sequence[Curve]) -> Curve:
         return curves[0] if len(curves) == 1 else ([], [])
     at = np.linspace(start, end, POINTS)
     levels = np.stack([np.interp(at, x, y) for x, y in curves], axis=-1)
-    return at.tolist(), seeds.iqm(levels).tolist()
+    return at.tolist(), [iqm(row) for row in levels]
 
 
 def colours_of(runs: Sequence[RunFiles]) -> dict[str, str]:
@@ -162,8 +163,8 @@ def _by_method(runs: Sequence[RunFiles]) -> Table:
             ("distance (VAL)", "distances.headline.value"),
         ):
             values = [v for run in mine if (v := finite(lookup(run.evaluation, path))) is not None]
-            low, high = (values and seeds.interval(values)) or (None, None)
-            middle = float(seeds.iqm(np.array(values))) if values else None
+            ends = iqm_interval(np.array(values), stream(0, "seeds"))
+            middle, low, high = (finite(v) for v in (iqm(np.array(values)), *ends))
             rows.append((method, name, float(len(values)), middle, low, high))
     head = ("method", "measured", "runs", "interquartile mean", "95 % low", "high")
     return Table(head, rows, "Every method; the interval is over runs")
