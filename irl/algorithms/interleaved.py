@@ -7,11 +7,16 @@ each update:  batch  <- replay memory, its terminations led into the absorbing s
 Discriminator and learner share the batch. The policy's side of the discriminator's data is the whole
 memory, not the newest policy's steps: no importance weights (Kostrikov et al. 2019, arXiv:1809.02925,
 section 4.1, which reports that leaving them out works well).
+
+With `expert_share`, that share of the learner's batch are the expert's steps that the discriminator has just
+seen, rewarded like any other: where the expert goes, critics know what is to be had before the policy has
+been there, and the actor is improved there too. No action is copied. Ren et al. (2024), Hybrid Inverse
+Reinforcement Learning, arXiv:2402.08848, train on such a mixture.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 
@@ -19,7 +24,7 @@ from irl.algorithms.adversarial import Discriminator, anneal, judge
 from irl.algorithms.loop import Learner, Round
 from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
-from irl.core.types import Metrics, Transitions
+from irl.core.types import Metrics, Transitions, concatenate
 
 
 @dataclass(frozen=True)
@@ -28,9 +33,21 @@ class InterleavedConfig:
 
     every: int = 1
     """Updates of the learner for one of the discriminator."""
+    expert_share: float = 0.0
+    """Share of the learner's batches that are demonstration steps, rewarded like any other."""
+
+    ADDED: ClassVar[dict[str, Any]] = {"expert_share": 0.0}
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "every")
+        if not 0.0 <= self.expert_share < 1.0:
+            raise ValueError(f"expert_share must be in [0, 1), not {self.expert_share}")
+
+
+def mixed(batch: Transitions, expert: Transitions, share: float) -> Transitions:
+    """The batch with the first `share` of its rows replaced by the expert's first, to the next whole row."""
+    rows = round(share * len(batch))
+    return concatenate([expert[:rows], batch[rows:]]) if rows else batch
 
 
 class Interleaved:
@@ -70,12 +87,16 @@ class Interleaved:
             self.index += 1
             yield Round(self.index, self.learner.env_steps, metrics)
 
-    def _before_update(self, batch: Transitions) -> None:
+    def _before_update(self, batch: Transitions) -> Transitions:
         self._updates += 1
-        if self._updates % self.schedule.every == 0:
-            expert = self.expert.sample(len(batch), self.rng)
+        learns = self._updates % self.schedule.every == 0
+        if not (learns or self.schedule.expert_share):
+            return batch
+        expert = self.expert.sample(len(batch), self.rng)
+        if learns:
             for name, value in self.discriminator.update(expert, batch).items():
                 self._sums[name] = self._sums.get(name, 0.0) + value
+        return mixed(batch, expert, self.schedule.expert_share)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on, between two rounds."""

@@ -10,7 +10,8 @@ from torch import Tensor
 from irl.core.types import Metrics, RewardFn, Transitions
 from irl.policies.policy import Policy
 
-BeforeUpdate = Callable[[Transitions], None]
+BeforeUpdate = Callable[[Transitions], Transitions]
+"""Given a batch drawn from a replay memory, says which batch is to be learned from."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class Learner(Protocol):
     def start(self, reward: RewardFn, before_update: BeforeUpdate | None = None) -> None:
         """Told once, before the first round: SAC updates while it collects, by this reward.
 
-        `before_update` is called with each batch drawn from a replay memory, before it is rewarded.
+        `before_update` is called with each batch drawn from a replay memory; what it returns, as many
+        steps, is rewarded and learned from.
         """
         ...
 

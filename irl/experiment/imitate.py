@@ -141,6 +141,11 @@ def _algorithm(
         chosen = schedule or InterleavedConfig()
         if not isinstance(chosen, InterleavedConfig):
             raise ValueError(f"SAC's schedule is an InterleavedConfig, not a {type(chosen).__name__}")
+        if chosen.expert_share:
+            raise ValueError(
+                "a ready-made SAC trains on what is in its own replay_buffer, so expert_share has to be 0; "
+                "use: irl train gail-sac --schedule.expert-share"
+            )
         return Interleaved(learner, judge, expert, chosen, rng)
     chosen = schedule or (
         ReplayedScheduleConfig() if isinstance(judge.config, AIRLConfig) else ScheduleConfig()

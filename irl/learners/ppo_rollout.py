@@ -43,7 +43,9 @@ class Rollouts:
         """What the reward is divided by before PPO sees it."""
         return self._scale.std
 
-    def start(self, reward: RewardFn, before_update: Callable[[Transitions], None] | None = None) -> None:
+    def start(
+        self, reward: RewardFn, before_update: Callable[[Transitions], Transitions] | None = None
+    ) -> None:
         """Nothing: a rollout is rewarded after it is collected.
 
         Raises:

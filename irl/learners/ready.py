@@ -106,7 +106,9 @@ class ReadySAC(_Ready):
         """Rewards reach SAC as they are."""
         return 1.0
 
-    def start(self, reward: RewardFn, before_update: Callable[[Transitions], None] | None = None) -> None:
+    def start(
+        self, reward: RewardFn, before_update: Callable[[Transitions], Transitions] | None = None
+    ) -> None:
         """Name the reward that every drawn batch is given, and who sees each batch before that."""
         self._memory.reward, self._memory.before_update = reward, before_update
 
@@ -147,12 +149,13 @@ class RewardedReplay(ReplayBuffer):
     """SB3's memory, which asks a `RewardFn` what each drawn batch is worth."""
 
     reward: RewardFn
-    before_update: Callable[[Transitions], None] | None = None
+    before_update: Callable[[Transitions], Transitions] | None = None
 
     def __init__(self, model: SAC, absorbing: bool) -> None:
         """An empty one, of the size and for the spaces of the model's.
 
-        With `absorbing`, `before_update` sees terminations led into the absorbing state
+        `before_update` sees each batch; what it returns is left alone, because SAC trains on what was drawn.
+        With `absorbing`, it sees terminations led into the absorbing state
         (`irl.envs.absorbing`); SAC's networks know none, so the reward adds what it pays.
         """
         self._absorbing = absorbing

@@ -234,8 +234,10 @@ class SACLearner:
         """Return (the environment's own) and length of each episode that ended since the last call."""
         return self.venv.take_finished()
 
-    def start(self, reward: RewardFn, before_update: Callable[[Transitions], None] | None = None) -> None:
-        """Name the reward that every sampled batch is given, and who sees each batch before that."""
+    def start(
+        self, reward: RewardFn, before_update: Callable[[Transitions], Transitions] | None = None
+    ) -> None:
+        """Name the reward that every sampled batch is given, and who says what is learned from instead."""
         self._reward, self._before_update = reward, before_update
 
     def collect(self) -> Transitions:
@@ -275,7 +277,7 @@ class SACLearner:
         draw = self.replay.sample_absorbing if self._absorbing else self.replay.sample
         batch = draw(self.config.batch_size, self._rng)
         if self._before_update is not None:
-            self._before_update(batch)
+            batch = self._before_update(batch)
         with torch.no_grad():
             reward = self._reward(batch).float()
         check_finite({"reward of a drawn batch": reward})

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import torch
 
-from irl.algorithms.interleaved import Interleaved, InterleavedConfig
+from irl.algorithms.interleaved import Interleaved, InterleavedConfig, mixed
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, Transitions, from_episodes
 from irl.learners.sac import SACConfig, SACLearner
@@ -104,3 +104,30 @@ def test_terminations_lead_into_the_absorbing_state_where_there_is_one(scale: fl
 def test_settings_that_make_no_sense_are_refused() -> None:
     with pytest.raises(ValueError, match="every must be at least 1"):
         replace(InterleavedConfig(), every=0)
+
+
+def test_a_share_of_what_is_learned_from_is_the_experts() -> None:
+    told = Told()
+    algorithm = loop(told)
+    algorithm.schedule = InterleavedConfig(expert_share=0.25)
+    list(algorithm.rounds(200))
+    seen = [batch for name, batch in told.calls if name == "update"]
+    learned = [batch for name, batch in told.calls if name == "reward"]
+    known = {tuple(row.tolist()) for row in algorithm.expert.obs}
+    for of_update, of_reward in zip(seen, learned, strict=True):
+        assert len(of_reward) == len(of_update) == 16
+        assert all(tuple(row.tolist()) in known for row in of_reward.obs[:4])
+        # the discriminator learns from the whole drawn batch, the learner from what is left of it
+        assert torch.equal(of_reward.obs[4:], of_update.obs[4:])
+        assert not torch.equal(of_reward.obs[:4], of_update.obs[:4])
+
+
+def test_no_share_is_the_drawn_batch_itself() -> None:
+    batch = from_episodes(pointmass.demonstrations(1))
+    assert mixed(batch, batch, 0.0) is batch
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.0])
+def test_a_share_is_below_one(share: float) -> None:
+    with pytest.raises(ValueError, match="expert_share must be in"):
+        InterleavedConfig(expert_share=share)
