@@ -13,7 +13,6 @@ from irl.demos.load import load_demos
 from irl.envs.tasks import task_name
 
 HERE = Path(__file__).parent
-EPISODES = 4
 
 
 class Contender:
@@ -49,14 +48,14 @@ class Contender:
         self._process.wait()
 
 
-def demonstrations(task: str, root: Path) -> Path:
-    """The expert's episodes as a dataset in `root`, and as the arrays that the peer is given."""
+def demonstrations(task: str, root: Path, episodes: int) -> Path:
+    """So many episodes of the expert's as a dataset in `root`, and as the arrays that the peer is given."""
     program = "from irl.experiment.cli import main; main()"
-    words = ["demos", "generate", "--env-id", task, "--episodes", str(EPISODES), "--datasets-root", str(root)]
+    words = ["demos", "generate", "--env-id", task, "--episodes", str(episodes), "--datasets-root", str(root)]
     subprocess.run([sys.executable, "-c", program, *words], check=True, stdout=subprocess.DEVNULL)
-    episodes = list(load_demos(f"irl/{task_name(task)}/expert-v0", root=root))
-    arrays: dict[str, Any] = {"episodes": len(episodes)}
-    for i, e in enumerate(episodes):
+    shown = list(load_demos(f"irl/{task_name(task)}/expert-v0", root=root))
+    arrays: dict[str, Any] = {"episodes": len(shown)}
+    for i, e in enumerate(shown):
         arrays |= {f"obs{i}": e.obs, f"action{i}": e.action, f"reward{i}": e.reward}
         arrays[f"terminal{i}"] = e.terminated
     np.savez(path := root / f"{task}.npz", **arrays)

@@ -28,6 +28,8 @@ from irl.core.provenance import command_line, environment
 RESULTS = Path(__file__).parent / "results" / "throughput.json"
 OURS = ("gail", "airl", "sb3-ppo", "dac", "dac-defaults", "dac-float32", "sb3-sac")
 PEERS = ("gail", "airl")
+EPISODES = 10
+"""Demonstrations: the peer's tuned GAIL draws 8192 steps at once and starts with no fewer."""
 RATIOS = {
     "gail_vs_imitation": ("gail", "imitation-gail"),
     "airl_vs_imitation": ("airl", "imitation-airl"),
@@ -132,13 +134,14 @@ def main(settings: Settings) -> None:
         print(f"without {name}: {why}")
     for task in settings.tasks:
         with tempfile.TemporaryDirectory() as folder:
-            demonstrations(task, Path(folder))
+            demonstrations(task, Path(folder), EPISODES)
             rows += timed(settings, task, Path(folder))
-    result = {"rows": rows, "ratios": ratios(rows), "commit": facts["git_commit"], **facts}
-    result |= {"threads": 1, "skipped": left_out}
-    settings.out.parent.mkdir(exist_ok=True)
-    settings.out.write_text(json.dumps(result, indent=1) + "\n")
-    print(json.dumps(result["ratios"], indent=1))
+        # after each task: what follows may fail, and a quiet machine is dear
+        result = {"rows": rows, "ratios": ratios(rows), "commit": facts["git_commit"], **facts}
+        result |= {"threads": 1, "skipped": left_out}
+        settings.out.parent.mkdir(exist_ok=True)
+        settings.out.write_text(json.dumps(result, indent=1) + "\n")
+    print(json.dumps(ratios(rows), indent=1))
 
 
 if __name__ == "__main__":

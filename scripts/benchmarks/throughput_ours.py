@@ -29,7 +29,6 @@ from irl.learners.ppo import PPOConfig, PPOLearner
 
 SETTINGS = json.loads(Path(__file__).with_name("peer_settings.json").read_text())
 ENVS = 8
-EPISODES = 4
 CHUNK = 250
 """Steps of SAC that are not interrupted."""
 
@@ -98,7 +97,7 @@ def dac(task: str, products: str, quantiles: int = 0) -> DACRun:
 
 def rounds(run: Imitation, root: Path, shares: dict[str, float] | None) -> Iterator[int]:
     """Train; the steps of each round."""
-    episodes: list[Episode] = list(load_demos(f"irl/{task_name(run.env_id)}/expert-v0", root=root))[:EPISODES]
+    episodes: list[Episode] = list(load_demos(f"irl/{task_name(run.env_id)}/expert-v0", root=root))
     algorithm = build.imitation(run, episodes)
     if shares is not None:
         watch(algorithm, shares)

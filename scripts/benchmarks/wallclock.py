@@ -26,6 +26,8 @@ from irl.policies.card import normalised_score
 from irl.policies.shelf import expert_card
 
 RESULTS = HERE / "results" / "wallclock.json"
+EPISODES = 4
+"""Demonstrations of both."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Settings:
 
 def run(name: str, seed: int, settings: Settings, root: Path) -> dict[str, Any]:
     """One run until it is there, or over."""
-    demos = demonstrations(settings.task, root)
+    demos = demonstrations(settings.task, root, EPISODES)
     more = [str(seed), str(settings.episodes)]
     if name == "irl":
         words = irl_words("wallclock_ours.py", settings.task, str(root), *more)
