@@ -26,6 +26,8 @@ SETTINGS = {
     "watch.eval-every": 2,
     "watch.eval-episodes": 2,
 }
+LOOK = ("--episodes=2", "--probe-steps=90", "--frames=6")
+"""For `irl evaluate`: enough to hold every part of it."""
 QUICK = [f"--{name}={value}" for name, value in SETTINGS.items()] + ["--watch.no-progress"]
 
 

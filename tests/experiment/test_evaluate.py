@@ -12,7 +12,7 @@ from irl.core.rng import episode_seeds
 from irl.envs.rollouts import rollouts
 from irl.policies import shelf
 from irl.policies.policy import load_policy
-from tests.experiment.conftest import DATASET, QUICK, TASK
+from tests.experiment.conftest import DATASET, LOOK, QUICK, TASK
 
 Command = Callable[..., None]
 
@@ -54,7 +54,7 @@ def test_a_score_is_against_the_experts_card_and_not_the_demonstrations(
     train: Callable[..., Path], irl: Command
 ) -> None:
     run = train("run")
-    irl("evaluate", run, "--episodes", "2")
+    irl("evaluate", run, *LOOK)
     references = files.read_json(run / "evaluation.json")["references"]
     card = shelf.find(TASK).card
     assert references["expert"]["return_mean"] == card.measured.return_mean
@@ -65,16 +65,16 @@ def test_a_score_is_against_the_experts_card_and_not_the_demonstrations(
 def test_evaluation_repeats_itself_and_leaves_the_run_alone(train: Callable[..., Path], irl: Command) -> None:
     run = train("run")
     metrics = (run / "metrics.jsonl").read_bytes()
-    irl("evaluate", run, "--episodes", "3")
+    irl("evaluate", run, *LOOK)
     first = files.read_json(run / "evaluation.json")
-    irl("evaluate", run, "--episodes", "3")
+    irl("evaluate", run, *LOOK)
     assert files.read_json(run / "evaluation.json") == first
     assert (run / "metrics.jsonl").read_bytes() == metrics
 
 
 def test_without_a_hand_written_reward_the_rest_is_still_said(irl: Command) -> None:
     irl("train", "gail", "--env-id", "NoReward-v0", "--out", "run", *QUICK)
-    irl("evaluate", "run", "--episodes", "3")
+    irl("evaluate", "run", *LOOK)
     found = files.read_json(Path("run/evaluation.json"))
     assert found["reward"]["pearson"] is None
     assert "constant" in found["reward"]["pearson_reason"]
@@ -84,7 +84,7 @@ def test_without_a_hand_written_reward_the_rest_is_still_said(irl: Command) -> N
 
 def test_a_task_that_pays_nan_is_evaluated_too(irl: Command) -> None:
     irl("train", "gail", "--env-id", "NaNReward-v0", "--demos", DATASET, "--out", "run", *QUICK)
-    irl("evaluate", "run", "--episodes", "3")
+    irl("evaluate", "run", *LOOK)
     found = files.read_json(Path("run/evaluation.json"))
     assert found["policy"]["return_mean"] is None
     assert found["policy"]["normalised_score"] is None
@@ -95,5 +95,5 @@ def test_a_task_that_pays_nan_is_evaluated_too(irl: Command) -> None:
 
 def test_with_no_episode_held_out_it_says_so(train: Callable[..., Path], irl: Command) -> None:
     run = train("run", "--demo-episodes", "6")
-    irl("evaluate", run, "--episodes", "3")
+    irl("evaluate", run, *LOOK)
     assert "held out" in files.read_json(run / "evaluation.json")["reward"]["notes"][0]

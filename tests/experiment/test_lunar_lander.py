@@ -9,7 +9,7 @@ import numpy as np
 from irl.demos.info import show
 from irl.demos.load import load_demos
 from tests.demos.files import flat, write_npz
-from tests.experiment.conftest import QUICK
+from tests.experiment.conftest import LOOK, QUICK
 
 TASK = ("--env-id", "LunarLander-v3", "--datasets-root", "ds")
 
@@ -42,6 +42,6 @@ def test_gail_learns_of_gymnasiums_own_lander(irl: Callable[..., None]) -> None:
         np.testing.assert_array_equal(a.action, b.action)
     irl("train", "gail", *TASK, "--demos", "irl/lunarlander/imported-v0", "--demo-episodes=2",
         "--out", "run", *QUICK, "--steps=384")  # fmt: skip
-    irl("evaluate", "run", "--episodes", 1)
+    irl("evaluate", "run", *LOOK)
     assert json.loads(Path("run/evaluation.json").read_text())["policy"]["normalised_score"] is not None
     assert len(Path("run/metrics.jsonl").read_text().splitlines()) == 3

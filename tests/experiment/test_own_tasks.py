@@ -23,7 +23,7 @@ from irl.rewards.wrapper import RewardWrapper
 from tests import pointmass
 from tests.demos.files import flat, write_npz
 from tests.demos.test_minari import buffer, written
-from tests.experiment.conftest import QUICK, TASK
+from tests.experiment.conftest import LOOK, QUICK, TASK
 
 Command = Callable[..., None]
 
@@ -61,7 +61,7 @@ def test_gail_balances_cartpole_from_imported_demonstrations(irl: Command) -> No
 def test_what_is_learned_of_a_choice_is_evaluated_exported_and_paid(irl: Command) -> None:
     cartpole(irl)
     irl(*TRAIN, *QUICK)
-    irl("evaluate", "run", "--episodes", 2)
+    irl("evaluate", "run", *LOOK)
     assert json.loads(Path("run/evaluation.json").read_text())["policy"]["normalised_score"] is not None
     assert Path("run/report.html").is_file()
     small = ("--ppo.n-envs=2", "--ppo.steps-per-round=128", "--ppo.batch-size=64", "--watch.no-progress")
@@ -141,21 +141,21 @@ def test_a_task_of_a_module_with_arguments(
     irl("train", "gail", *task, "--demos", "irl/t-v0", "--demo-episodes", 2, "--out", "run", *QUICK)
     config = json.loads(Path("run/config.json").read_text())
     assert (config["env_id"], config["env_kwargs"]) == ('Theirs-v0?{"cliff":1.2}', [])
-    irl("evaluate", "run", "--episodes", 2)
+    irl("evaluate", "run", *LOOK)
     irl("train", "--resume", "run")
     # another process does not know the task, until it is named again
     monkeypatch.delitem(gym.registry, "Theirs-v0")
     monkeypatch.delitem(sys.modules, theirs)
     with pytest.raises(SystemExit):
-        irl("evaluate", "run", "--episodes", 2)
+        irl("evaluate", "run", *LOOK)
     assert "--import MODULE" in capfd.readouterr().err
-    irl("evaluate", "run", "--episodes", 2, f"--import={theirs}")
+    irl("evaluate", "run", *LOOK, f"--import={theirs}")
 
 
 def test_arguments_change_the_task_that_is_trained_in(irl: Command) -> None:
     irl("train", "gail", "--env-id", TASK, "--env-kwargs", '{"cliff": 0.05}', "--out", "run", *QUICK,
         "--demos", "irl/pointmass/expert-v0")  # fmt: skip
-    irl("evaluate", "run", "--episodes", 3)
+    irl("evaluate", "run", *LOOK, "--episodes", 3)
     assert json.loads(Path("run/evaluation.json").read_text())["policy"]["length_min"] < 30
 
 
@@ -176,7 +176,7 @@ def test_demonstrations_without_actions(inputs: str, irl: Command, capfd: pytest
         )
     assert "have no actions" in capfd.readouterr().err
     irl(*words, "--demo-episodes=3", "--discriminator.inputs", inputs, "--out", "run")
-    irl("evaluate", "run", "--episodes", 2)
+    irl("evaluate", "run", *LOOK)
     found = json.loads(Path("run/evaluation.json").read_text())
     assert found["reward"]["auroc"] is not None
     assert found["references"]["demonstrations"]["return_mean"] is None
@@ -218,7 +218,7 @@ INTO_RUN = ("--datasets-root", "ds", "--demo-episodes=2", "--out", "run", *QUICK
 def test_parts_of_observations_in_a_dictionary_are_learned_from(irl: Command) -> None:
     task = ("--env-id", "InParts-v0", "--env-kwargs", '{"obs_keys": ["place"]}')
     irl("train", "gail", *task, "--demos", "parts-v0", *INTO_RUN)
-    irl("evaluate", "run", "--episodes", 2)
+    irl("evaluate", "run", *LOOK)
     assert load_reward(Path("run")).spec.net.obs_dim == 2
 
 

@@ -24,10 +24,9 @@ from irl.policies.density import Density
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
 from tests import pointmass
-from tests.experiment.conftest import QUICK, TASK
+from tests.experiment.conftest import LOOK, QUICK, TASK
 
 Command = Callable[..., None]
-SMALL = ("--episodes=2", "--probe-steps=90")
 
 
 def test_the_probe_of_a_run_has_the_base_of_its_task(
@@ -48,7 +47,7 @@ def test_the_probe_of_a_run_has_the_base_of_its_task(
 
 def test_distances_and_drift_of_a_run(train: Callable[..., Path], irl: Command, capsys) -> None:
     run = train("run")
-    irl("evaluate", run, *SMALL, "--also", "pearson", "npec")
+    irl("evaluate", run, *LOOK, "--also", "pearson", "npec")
     found = files.read_json(run / "evaluation.json")
     distances, drift = found["distances"], found["drift"]
     assert [d["n"] for d in distances["curve"]] == [1, 10, 50, 100, 0]
@@ -75,7 +74,7 @@ def test_a_probe_that_was_saved_says_what_one_that_is_played_does(
     train: Callable[..., Path], irl: Command
 ) -> None:
     run = train("run")
-    irl("evaluate", run, *SMALL)
+    irl("evaluate", run, *LOOK)
     played = files.read_json(run / "evaluation.json")["distances"]
     irl("probe", run, "--steps=90")
     irl("evaluate", run, "--episodes=2", "--probe", run / "probe.npz")
@@ -103,7 +102,7 @@ def test_what_is_missing_for_a_probe_is_one_line(words, irl: Command, capsys) ->
 
 def test_the_parts_of_airl_are_apart(irl: Command) -> None:
     irl("train", "airl", "--env-id", TASK, "--out", "run", *QUICK)
-    irl("evaluate", "run", *SMALL)
+    irl("evaluate", "run", *LOOK)
     parts = files.read_json(Path("run/evaluation.json"))["drift"]["parts"]
     assert list(parts) == ["logit", "f", "g", "h"]
     last = max(Path("run/snapshots").iterdir())

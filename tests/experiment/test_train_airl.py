@@ -17,7 +17,7 @@ from irl.experiment import build
 from irl.experiment.configs import AIRLRun, AIRLSACRun
 from irl.learners.ppo import PPOConfig, PPOLearner
 from tests import pointmass
-from tests.experiment.conftest import QUICK, TASK
+from tests.experiment.conftest import LOOK, QUICK, TASK
 from tests.experiment.test_train_dac import SMALL, same
 
 Command = Callable[..., None]
@@ -54,7 +54,7 @@ def test_the_tasks_own_reward_replaced_by_nan_changes_no_weight(learn: Train) ->
 
 def test_the_reward_of_a_run_is_g_unless_f_is_asked_for(learn: Train, irl: Command) -> None:
     run = learn("airl", "run", "--discriminator.inputs=obs")
-    irl("evaluate", run, "--episodes=2")
+    irl("evaluate", run, *LOOK)
     assert json.loads((run / "evaluation.json").read_text())["method"] == "airl"
     g, f = package.load_reward(run), package.load_reward(run, "f")
     assert (g.spec.reward_map, f.spec.reward_map, g.spec.inputs) == ("g", "f", "obs")

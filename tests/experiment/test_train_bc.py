@@ -9,7 +9,7 @@ import pytest
 from irl.core import files
 from irl.core.records import open_run
 from irl.policies.policy import load_policy
-from tests.experiment.conftest import QUICK, TASK
+from tests.experiment.conftest import LOOK, QUICK, TASK
 
 Command = Callable[..., None]
 Train = Callable[..., Path]
@@ -69,7 +69,7 @@ def test_evaluate_measures_the_policy_and_says_that_there_is_no_reward(
     clone: Train, irl: Command, capsys: pytest.CaptureFixture
 ) -> None:
     run = clone("run", "--learner.policy=squashed_gaussian")
-    irl("evaluate", run, "--episodes=2")
+    irl("evaluate", run, *LOOK)
     found = files.read_json(run / "evaluation.json")
     assert found["policy"]["episodes"] == 2
     assert "learns no reward" in found["reward"]["notes"][0]

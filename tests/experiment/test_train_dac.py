@@ -11,7 +11,7 @@ from safetensors.numpy import load_file
 import irl as package
 from irl.core import files
 from irl.policies.policy import load_policy
-from tests.experiment.conftest import TASK
+from tests.experiment.conftest import LOOK, TASK
 
 Command = Callable[..., None]
 
@@ -77,7 +77,7 @@ def test_the_tasks_own_reward_replaced_by_nan_changes_no_weight(train: Train) ->
 
 def test_a_run_is_evaluated_and_its_reward_and_policy_can_be_used(train: Train, irl: Command) -> None:
     run = train("dac", "run")
-    irl("evaluate", run, "--episodes=2")
+    irl("evaluate", run, *LOOK)
     assert json.loads((run / "evaluation.json").read_text())["method"] == "dac"
     reward = package.load_reward(run)
     assert (reward.spec.reward_map, reward.spec.net.absorbing_scale) == ("logit", 10.0)

@@ -12,7 +12,7 @@ from irl.core.types import from_episodes
 from irl.demos.load import load_demos
 from irl.rewards.artefact import load_reward
 from irl.rewards.ensemble import EnsembleNet
-from tests.experiment.conftest import DATASET, QUICK, TASK
+from tests.experiment.conftest import DATASET, LOOK, QUICK, TASK
 
 Command = Callable[..., None]
 WORDS = ("--env-id", TASK, *QUICK, "--steps=256", "--watch.no-tensorboard")
@@ -39,7 +39,7 @@ def test_an_ensemble_is_saved_read_and_judged(irl: Command, method: str) -> None
     torn.write_bytes(b"torn")
     irl("train", "--resume", "run")
     assert (last("run") / "reward" / "weights.safetensors").read_bytes() == before
-    irl("evaluate", "run", "--episodes=2", "--probe-steps=50")
+    irl("evaluate", "run", *LOOK)
 
 
 def test_whole_steps_are_judged_and_the_settings_are_written_down(irl: Command) -> None:

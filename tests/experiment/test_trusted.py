@@ -19,10 +19,9 @@ from irl.experiment.trusted import _numbers, _proxy_gold
 from irl.report.folder import lookup
 from irl.rewards.mujoco import HandWritten
 from tests import pointmass
-from tests.experiment.conftest import DATASET, QUICK, TASK
+from tests.experiment.conftest import DATASET, LOOK, QUICK, TASK
 
 Command = Callable[..., None]
-SMALL = ("--episodes=2", "--probe-steps=90")
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +33,7 @@ def judged(home: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, An
         patch.setenv("MINARI_DATASETS_PATH", str(home / "datasets"))
         patch.chdir(folder)
         main(["train", "gail", "--env-id", TASK, "--out", "run", *QUICK])
-        main(["evaluate", "run", *SMALL])
+        main(["evaluate", "run", *LOOK])
     return files.read_json(folder / "run" / "evaluation.json")
 
 
@@ -70,7 +69,7 @@ def test_a_run_is_judged_by_policies_and_over_itself(judged: dict[str, Any]) -> 
 
 def test_without_a_true_return_it_says_so(irl: Command) -> None:
     irl("train", "gail", "--env-id", "NaNReward-v0", "--demos", DATASET, "--out", "run", *QUICK)
-    irl("evaluate", "run", *SMALL)
+    irl("evaluate", "run", *LOOK)
     found = files.read_json(Path("run/evaluation.json"))
     assert "not a finite number" in found["cross_play"]["reason"]
     assert "finite" in found["proxy_gold"]["reason"]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from irl.experiment.cli import main
-from tests.experiment.conftest import QUICK, TASK, home
+from tests.experiment.conftest import LOOK, QUICK, TASK, home
 
 __all__ = ["home"]
 
@@ -26,7 +26,7 @@ def whole(home: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch, _at(folder, patch):
         words = ["--watch.no-tensorboard", "--watch.checkpoint-every-s=0"]
         main(["train", "gail", "--env-id", TASK, "--out", "run", *QUICK, *words])
-        main(["evaluate", "run", "--episodes", "2"])
+        main(["evaluate", "run", *LOOK])
     # megabytes, and nothing reads it
     (folder / "run" / "report.html").unlink()
     return folder
