@@ -147,6 +147,27 @@ def test_no_file_from_elsewhere_can_run_code():
     assert found == []
 
 
+# Where tensors are the CPU's already: kept there, or made there.
+HERE = {"weight.numpy()"}
+HERE_IN = {"ppo_collect.py": "what acts step by step is a copy on the CPU"}
+
+
+def test_arrays_are_made_of_what_was_brought_to_the_cpu():
+    """A tensor of a GPU has no `numpy`; no test here has one."""
+    trained_with = [
+        f for f in FILES if layer_of(f) in ("algorithms", "discriminators", "learners", "rewards")
+    ]
+    found = [
+        f"{where(file, node.lineno)} {ast.unparse(node)}"
+        for file in trained_with
+        if file.name not in HERE_IN
+        for node in ast.walk(tree(file))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "numpy"
+        if ".cpu()" not in ast.unparse(node) and ast.unparse(node) not in HERE
+    ]
+    assert found == []
+
+
 def test_randomness_is_an_argument():
     found = [
         f"{where(file, line)} {name}"

@@ -59,5 +59,7 @@ DECLARED: dict[str, tuple[str, str]] = {
     "sac/actor_loss": ("the actor's loss at the round's last update", "scaled return"),
     "sac/critic_loss": ("the critics' loss at the round's last update", "squared return"),
     "sac/ent_coef": ("temperature of the entropy bonus at the round's last update", "reward"),
+    "td3/actor_loss": ("the actor's loss, the round's last time that it was improved", "scaled return"),
+    "td3/critic_loss": ("the critics' loss at that update", "squared return"),
     "ppo/std": ("standard deviation of the actions, mean over their dimensions", "action"),
 }

@@ -58,7 +58,8 @@ def behaving(act: ActFn, how: Behaviour, space: gym.Space, seed: int, episode: i
     Raises:
         UserError: it is to be drawn from and has no distribution, or noise is for a choice of actions.
     """
-    if how.stochastic and not isinstance(act, Samples):
+    # a policy that can be asked for draws may still have nothing to draw from
+    if how.stochastic and not (isinstance(act, Samples) and getattr(act, "draws", True)):
         raise UserError("this policy has no distribution to draw actions from; leave --stochastic away")
     if how.noise and isinstance(space, OneHot):
         raise UserError(f"noise has no meaning for {space}, a choice of actions; --random-actions has")

@@ -25,21 +25,22 @@ from irl.envs.discrete import OneHot
 from irl.envs.make import make as make_env
 from irl.experiment.configs import (
     AIRLRun,
-    AIRLSACRun,
     BCRun,
-    DACRun,
     ExpertRun,
     FromDemonstrations,
-    GAILSACRun,
     Imitation,
+    OffPolicyRun,
     RetrainRun,
 )
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig, SACLearner
+from irl.learners.td3 import TD3Config, TD3Learner
 from irl.policies.policy import PolicySpec
-from irl.policies.trainable import fresh_policy
+from irl.policies.trainable import drawing, fresh_policy
 from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
+
+AnyLearner = PPOLearner | SACLearner | TD3Learner
 
 
 def check_device(device: str) -> None:
@@ -64,13 +65,13 @@ def check_learner(kind: str, env: gym.Env) -> None:
     """Refuse a learner for a task whose actions it cannot take.
 
     Raises:
-        UserError: it is SAC, and the task has a choice of actions.
+        UserError: it is SAC or TD3, and the task has a choice of actions.
     """
-    if kind == SACConfig.KIND and isinstance(env.action_space, OneHot):
+    if kind in (SACConfig.KIND, TD3Config.KIND) and isinstance(env.action_space, OneHot):
         wanted = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
         raise UserError(
-            f"SAC takes actions that are real numbers, {wanted} has a choice of {env.action_space.shape[0]}; "
-            f"learn with PPO: irl train gail, or --algo ppo"
+            f"{kind.upper()} takes actions that are real numbers, {wanted} has a choice of "
+            f"{env.action_space.shape[0]}; learn with PPO: irl train gail, or --algo ppo"
         )
 
 
@@ -92,7 +93,7 @@ def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | I
     discriminator = _discriminator(config, expert, normaliser, learner)
     rng = torch_stream(config.seed, "minibatches", config.device)
     expert = expert.to(config.device)
-    if isinstance(config, GAILSACRun | DACRun | AIRLSACRun):
+    if isinstance(config, OffPolicyRun):
         return Interleaved(learner, discriminator, expert, config.schedule, rng)
     absorbing = isinstance(config, AIRLRun) and scale > 0
     return Adversarial(learner, discriminator, expert, config.schedule, rng, absorbing=absorbing)
@@ -110,12 +111,12 @@ def cloning(config: BCRun, episodes: Sequence[Episode], held_out: Sequence[Episo
     return BC(fit, from_episodes(held_out) if held_out else None, c.steps_per_round)
 
 
-def _warm_start(config: Imitation, learner: PPOLearner | SACLearner, expert: Transitions) -> None:
+def _warm_start(config: Imitation, learner: AnyLearner, expert: Transitions) -> None:
     """Clone the learner's policy from where it is, before anything is played."""
     if config.warm_start.updates == 0:
         return
     rng = torch_stream(config.seed, "cloning", config.device)
-    fit = Cloning(learner.policy(), expert, config.warm_start, rng)
+    fit = Cloning(drawing(learner.policy()), expert, config.warm_start, rng)
     for _ in range(config.warm_start.updates):
         fit.update()
     check_finite(named("cloned policy", fit.net.state_dict()))
@@ -123,7 +124,7 @@ def _warm_start(config: Imitation, learner: PPOLearner | SACLearner, expert: Tra
 
 
 def _discriminator(
-    config: Imitation, expert: Transitions, normaliser: Normaliser, learner: PPOLearner | SACLearner
+    config: Imitation, expert: Transitions, normaliser: Normaliser, learner: AnyLearner
 ) -> GAIL | AIRL | Ensemble:
     sizes = expert.obs.shape[1], expert.action.shape[1] or len(_actions(config.env_id).low)
     settings = config.discriminator
@@ -156,9 +157,9 @@ def forward(config: ExpertRun) -> Forward:
 
 
 def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
-    """PPO or SAC on a learned reward, with a copy of its normaliser, which stays as it is.
+    """PPO, SAC or TD3 on a learned reward, with a copy of its normaliser, which stays as it is.
 
-    Terminations lead into the absorbing state if the reward knows one: SAC puts it into its memory, for PPO
+    Terminations lead into the absorbing state if the reward knows one: memories have it, for PPO
     the reward adds what it pays.
     """
     scale = reward.spec.net.absorbing_scale
@@ -168,7 +169,7 @@ def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
 
 def _learner(
     config: Imitation | ExpertRun | RetrainRun, normaliser: Normaliser | None = None, scale: float = 0.0
-) -> PPOLearner | SACLearner:
+) -> AnyLearner:
     seeds = episode_seeds(config.seed, "training", config.learner.n_envs)
     run = {"seed": config.seed, "total_steps": config.steps, "device": config.device}
     run["normaliser"] = normaliser
@@ -177,3 +178,5 @@ def _learner(
             return PPOLearner(config.env_id, seeds, settings, **run)
         case SACConfig() as settings:
             return SACLearner(config.env_id, seeds, settings, absorbing_scale=scale, **run)
+        case TD3Config() as settings:
+            return TD3Learner(config.env_id, seeds, settings, absorbing_scale=scale, **run)

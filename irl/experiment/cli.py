@@ -26,7 +26,16 @@ from irl.experiment import (
     shelved,
     train,
 )
-from irl.experiment.configs import AIRLRun, AIRLSACRun, BCRun, DACRun, GAILRun, GAILSACRun
+from irl.experiment.configs import (
+    AIRLRun,
+    AIRLSACRun,
+    BCRun,
+    DACRun,
+    DACTD3Run,
+    GAILRun,
+    GAILSACRun,
+    GAILTD3Run,
+)
 from irl.experiment.imitation_run import AdversarialRun
 from irl.experiment.modules import import_named
 from irl.experiment.play import Interrupted
@@ -43,7 +52,9 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("demos", "list"): (demonstrations.ListDemos, demonstrations.list_demos),
     ("train", "gail"): (GAILRun, train.train),
     ("train", "gail-sac"): (GAILSACRun, train.train),
+    ("train", "gail-td3"): (GAILTD3Run, train.train),
     ("train", "dac"): (DACRun, train.train),
+    ("train", "dac-td3"): (DACTD3Run, train.train),
     ("train", "airl"): (AIRLRun, train.train),
     ("train", "airl-sac"): (AIRLSACRun, train.train),
     ("train", "bc"): (BCRun, train.train),
@@ -58,6 +69,15 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("experts", "evaluate"): (shelved.EvaluateExpert, shelved.evaluate),
     ("experts", "list"): (shelved.ListExperts, shelved.list_experts),
 }
+
+REFUSED = {
+    (
+        "train",
+        "airl-td3",
+    ): "AIRL's discriminator is f - log pi, and TD3's policy has one action for a state, so "
+    "no log pi; use: irl train airl-sac, or irl train dac-td3"
+}
+"""What one might type and there is no way to do."""
 
 _FULL = "; free some space, or choose a folder on another disk"
 _CLOSED = "; choose a folder that you may write to"
@@ -83,6 +103,8 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 def _dispatch(words: list[str]) -> None:
+    if reason := REFUSED.get(tuple(words[:2])):
+        raise UserError(reason)
     for n in (2, 1):
         if (name := tuple(words[:n])) in COMMANDS and len(name) == n:
             cls, run = COMMANDS[name]

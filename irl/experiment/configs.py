@@ -15,6 +15,7 @@ from irl.discriminators.gail import GAILConfig
 from irl.experiment.imitation_run import AdversarialRun, ImitationRun, Watch
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
+from irl.learners.td3 import TD3Config
 
 
 @dataclass(frozen=True)
@@ -41,32 +42,56 @@ OFF_POLICY = SACConfig(
 """SAC beside a discriminator, or on what one left."""
 
 
+# The paper's, and random actions as in the code of DAC's authors: nothing of TD3 was tuned here.
+OFF_POLICY_TD3 = TD3Config(learning_starts=1000, products=products.fastest())
+"""TD3 beside a discriminator, or on what one left."""
+
+
 @dataclass(frozen=True)
-class GAILSACRun(AdversarialRun):
+class OffPolicyRun(AdversarialRun):
+    """What every method that learns off policy is told besides."""
+
+    demo_episodes: int = 5
+    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
+    steps: int = 150_000
+    """Environment steps in all."""
+    schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
+
+
+@dataclass(frozen=True)
+class GAILSACRun(OffPolicyRun):
     """Generative adversarial imitation learning with SAC, on the steps of its whole memory."""
 
     KIND: ClassVar[str] = "gail-sac"
-    demo_episodes: int = 5
-    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
-    steps: int = 150_000
-    """Environment steps in all."""
     learner: SACConfig = OFF_POLICY
     discriminator: GAILConfig = field(default_factory=GAILConfig)
-    schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
 
 
 @dataclass(frozen=True)
-class DACRun(AdversarialRun):
+class GAILTD3Run(OffPolicyRun):
+    """Generative adversarial imitation learning with TD3, on the steps of its whole memory."""
+
+    KIND: ClassVar[str] = "gail-td3"
+    learner: TD3Config = OFF_POLICY_TD3
+    discriminator: GAILConfig = field(default_factory=GAILConfig)
+
+
+@dataclass(frozen=True)
+class DACRun(OffPolicyRun):
     """Discriminator-actor-critic: SAC, the logit as reward, and terminations led into an absorbing state."""
 
     KIND: ClassVar[str] = "dac"
-    demo_episodes: int = 5
-    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
-    steps: int = 150_000
-    """Environment steps in all."""
     learner: SACConfig = OFF_POLICY
     discriminator: DACConfig = field(default_factory=DACConfig)
-    schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
+
+
+@dataclass(frozen=True)
+class DACTD3Run(OffPolicyRun):
+    """Discriminator-actor-critic with TD3, as in its paper."""
+
+    KIND: ClassVar[str] = "dac-td3"
+    learner: TD3Config = OFF_POLICY_TD3
+    discriminator: DACConfig = field(default_factory=DACConfig)
 
 
 @dataclass(frozen=True)
@@ -92,17 +117,12 @@ class AIRLRun(AdversarialRun):
 
 
 @dataclass(frozen=True)
-class AIRLSACRun(AdversarialRun):
+class AIRLSACRun(OffPolicyRun):
     """Adversarial inverse reinforcement learning with SAC, on the steps of its whole memory."""
 
     KIND: ClassVar[str] = "airl-sac"
-    demo_episodes: int = 5
-    """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
-    steps: int = 150_000
-    """Environment steps in all."""
     learner: SACConfig = OFF_POLICY
     discriminator: AIRLConfig = field(default_factory=lambda: AIRLConfig(lr=3e-4, reward="f"))
-    schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -144,7 +164,7 @@ class BCRun(ImitationRun):
     learner: ClonedConfig = field(default_factory=ClonedConfig)
 
 
-Imitation = GAILRun | GAILSACRun | DACRun | AIRLRun | AIRLSACRun
+Imitation = GAILRun | GAILSACRun | GAILTD3Run | DACRun | DACTD3Run | AIRLRun | AIRLSACRun
 """Every method that learns a reward, by its `KIND`."""
 
 FromDemonstrations = Imitation | BCRun
@@ -185,7 +205,7 @@ class RetrainRun:
     steps: int
     seed: int
     out: Path
-    learner: PPOConfig | SACConfig
+    learner: PPOConfig | SACConfig | TD3Config
     watch: Watch
     device: Literal["cpu", "cuda"]
     threads: int

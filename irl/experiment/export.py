@@ -23,8 +23,8 @@ from irl.policies.policy import Policy, check_policy, load_policy
 class Export:
     """Write a policy as a Stable-Baselines3 zip.
 
-    PPO.load or SAC.load reads it where irl is installed, and predicts what the policy does. Value network
-    and critics in it are random and untrained: a saved policy has none.
+    PPO.load, SAC.load or TD3.load reads it where irl is installed, and predicts what the policy does. Value
+    network and critics in it are random and untrained: a saved policy has none.
     """
 
     run: tyro.conf.Positional[Path]
@@ -49,7 +49,7 @@ def export(command: Export) -> None:
     policy = load_policy(source)
     files.write_bytes(out, _zip(policy, source))
     algorithm = ALGORITHMS[policy.spec.distribution]
-    untrained = {"PPO": "the value network", "SAC": "the critics"}[algorithm.__name__]
+    untrained = "the value network" if algorithm.__name__ == "PPO" else "the critics"
     Console().print(
         f"wrote {out}: stable_baselines3.{algorithm.__name__}.load reads it where irl is installed; "
         f"{untrained} in it: random, untrained",

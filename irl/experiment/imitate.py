@@ -93,6 +93,11 @@ def _defaults(method: str, algorithm: str) -> GAILConfig | AIRLConfig:
 
 
 def _check(model: Any, expert: Transitions, method: str, settings: GAILConfig | AIRLConfig) -> None:
+    if method == "airl" and type(model).__name__ in ("TD3", "DDPG"):
+        raise ValueError(
+            f"AIRL's discriminator is f - log pi, and {type(model).__name__}'s policy has one action for a "
+            f"state, so no log pi; use a SAC or PPO"
+        )
     if isinstance(settings, AIRLConfig) != (method == "airl"):
         raise ValueError(f"{type(settings).__name__} are no settings of {method}")
     observations, actions = model.observation_space.shape, model.action_space.shape

@@ -26,16 +26,24 @@ class Preset:
 
 _SAC = {"learner.quantiles": 0, "learner.average": 0.0, "learner.lr_schedule": "constant"}
 
+_TD3 = {
+    "learner.exploration_noise": 0.1,
+    "learner.policy_delay": 2,
+    "learner.target_policy_noise": 0.2,
+    "learner.target_noise_clip": 0.5,
+}
+
 PRESETS: dict[str, Preset] = {
     "dac-paper": Preset(
-        "dac",
+        "dac-td3",
         "the code of Kostrikov et al. (2019), arXiv:1809.02925: google-research/dac",
-        "the learner is SAC (TD3 there); updates follow each step (each episode there)",
-        _SAC
-        | {
+        "updates follow each step (each episode there), the actor's from the first on (after 1000 there); "
+        "its rate stays (halved every 100,000 steps there); weights begin as SB3's",
+        {
             "demo_episodes": 4,
             "demo_rate": 20,
             "steps": 1_000_000,
+            **_TD3,
             "learner.hidden": (400, 300),
             "learner.lr": 1e-3,
             "learner.batch_size": 100,
@@ -47,12 +55,12 @@ PRESETS: dict[str, Preset] = {
         },
     ),
     "orsini": Preset(
-        "gail-sac",
+        "gail-td3",
         "run_gail.py of acme, released beside Orsini et al. (2021), arXiv:2106.00672",
-        "the learner is SAC (TD3 there)",
-        _SAC
-        | {
+        "updates follow each step of one environment; networks of the learner are SB3's",
+        {
             "steps": 1_000_000,
+            **_TD3,
             "learner.lr": 3e-4,
             "learner.batch_size": 256,
             "discriminator.hidden": (64,),

@@ -23,7 +23,7 @@ from irl.envs.make import check_module
 from irl.envs.names import full_name, split_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
-from irl.experiment.configs import OFF_POLICY, BCRun, Imitation, RetrainRun
+from irl.experiment.configs import OFF_POLICY, OFF_POLICY_TD3, BCRun, Imitation, RetrainRun
 from irl.experiment.frozen import RECORD, frozen, frozen_again, recorded
 from irl.experiment.imitation_run import Watch, Words
 from irl.experiment.play import Player
@@ -31,6 +31,7 @@ from irl.experiment.retrained import report
 from irl.experiment.snapshots import snapshot_of
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
+from irl.learners.td3 import TD3Config
 from irl.policies.policy import save_policy
 
 Seeds = Annotated[tuple[int, ...], tyro.conf.arg(metavar="SEED ...")]
@@ -57,7 +58,7 @@ class Retrain:
     dynamics: Words = ()
     """Retrain under other dynamics of a MuJoCo task: mass, gravity, friction or damping by a factor, e.g.
     gravity=0.5; disabled_legs=2 of the ant."""
-    algo: Literal["ppo", "sac"] | None = None
+    algo: Literal["ppo", "sac", "td3"] | None = None
     """Which learner; the run's own unless given."""
     steps: int | None = None
     """Environment steps; as many as the run's unless given."""
@@ -75,6 +76,8 @@ class Retrain:
     """How PPO learns; its own defaults, whatever the run had."""
     sac: SACConfig = OFF_POLICY
     """How SAC learns; its defaults for imitation, whatever the run had."""
+    td3: TD3Config = OFF_POLICY_TD3
+    """How TD3 learns, likewise."""
     watch: Watch = field(default_factory=Watch)
     device: Literal["cpu", "cuda"] = "cpu"
     """Where the networks live."""
@@ -149,7 +152,7 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
     """
     assert command.run is not None
     algo = command.algo or its.learner.KIND
-    for name, default in (("ppo", PPOConfig()), ("sac", OFF_POLICY)):
+    for name, default in (("ppo", PPOConfig()), ("sac", OFF_POLICY), ("td3", OFF_POLICY_TD3)):
         if name != algo and getattr(command, name) != default:
             raise UserError(f"--{name}.* are settings of a learner that is not used; choose --algo {name}")
     seed = (its.seed + SEED_APART) % (MOST_SEED + 1) if command.seed is None else command.seed
@@ -166,7 +169,7 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
         steps=its.steps if command.steps is None else command.steps,
         seed=seed,
         out=command.out or Path("runs") / f"retrain-{source.name}-{step}{of}-{algo}-s{seed}",
-        learner=command.ppo if algo == "ppo" else command.sac,
+        learner=getattr(command, algo),
         watch=command.watch,
         device=command.device,
         threads=command.threads,

@@ -22,8 +22,9 @@ from irl.core.nets import Normaliser
 from irl.core.types import Metrics, Transitions
 from irl.learners import sac_gradients as gradients
 from irl.learners.heads import Head, Lowest
+from irl.learners.inputs import Inputs, acting
 from irl.learners.sac_losses import actor_loss, soft_value, squashed, td_target
-from irl.learners.stack import Stack
+from irl.learners.stack import Stack, stacked
 
 
 class _Drawn(NamedTuple):
@@ -62,21 +63,21 @@ class SACUpdate:
     ) -> None:
         """`rng` draws the actions' noise; None is torch's global generator, which SB3 draws from.
 
-        `head` says what the critics' outputs are; one number each unless given.
-
-        With `absorbing_scale` the networks take one number more than an observation has: that, in the
-        absorbing state, else 0.
+        `head` says what the critics' outputs are; one number each unless given. `absorbing_scale` is told
+        of `Inputs`.
         """
-        self.model, self.rng, self._scale, self._head = model, rng, absorbing_scale, head or Lowest()
+        self.model, self.rng, self._head = model, rng, head or Lowest()
+        box = model.action_space
+        assert isinstance(box, Box)
+        self.inputs = Inputs(normaliser, box, absorbing_scale)
         self.updates = 0
         """How many there were."""
-        self._mean, self._std, self._clip = normaliser.mean, normaliser.std, normaliser.clip
-        actor, device = model.actor, model.device
+        actor = model.actor
         assert isinstance(actor.mu, nn.Linear)
         assert isinstance(actor.log_std, nn.Linear)
         self._actor = Stack([linear_layers(actor.latent_pi)], [[actor.mu, actor.log_std]], dtype=dtype)
-        self._critics = _value_nets(model.critic.q_networks, dtype)
-        self._targets = _value_nets(model.critic_target.q_networks, dtype)
+        self._critics = stacked(model.critic.q_networks, dtype)
+        self._targets = stacked(model.critic_target.q_networks, dtype)
         # SB3 has a logarithm of a temperature that is learned, and the number of one that stays
         self._learns_temperature = model.log_ent_coef is not None
         learned = model.log_ent_coef if self._learns_temperature else model.ent_coef_tensor.log().reshape(1)
@@ -85,10 +86,6 @@ class SACUpdate:
         self._log_temperature.grad = torch.zeros_like(self._log_temperature)
         trained = (self._actor.flat, self._critics.flat, self._log_temperature)
         self.optimizers = [torch.optim.Adam([weights], fused=True) for weights in trained]
-        box = model.action_space
-        assert isinstance(box, Box)
-        self._center = torch.as_tensor((box.high + box.low) / 2, device=device)
-        self._half = torch.as_tensor((box.high - box.low) / 2, device=device)
         self._last: _Last | None = None
 
     @torch.no_grad()
@@ -96,9 +93,9 @@ class SACUpdate:
         """Temperature, critics, actor, then the target critics follow. Actions in environment units."""
         for optimizer in self.optimizers:
             optimizer.param_groups[0]["lr"] = lr
-        size, alive, next_alive = len(batch), _alive(batch.absorbing), _alive(batch.next_absorbing)
-        obs = self.features(batch.obs, batch.absorbing)
-        next_obs = self.features(batch.next_obs, batch.next_absorbing)
+        size, alive, next_alive = len(batch), acting(batch.absorbing), acting(batch.next_absorbing)
+        obs = self.inputs.features(batch.obs, batch.absorbing)
+        next_obs = self.inputs.features(batch.next_obs, batch.next_absorbing)
         temperature = self._log_temperature.exp().squeeze()
         outputs, activations = self._actor(torch.cat([obs, next_obs]))
         drawn, following = self._sampled(outputs[0, :size]), self._sampled(outputs[0, size:])
@@ -108,7 +105,7 @@ class SACUpdate:
             self._improve_temperature(drawn.log_pi, shares)
         next_value = self._next_value(next_obs, following, temperature, next_alive)
         target = td_target(reward, next_value, batch.terminated, self.model.gamma)
-        said = self._improve_critics(torch.cat([obs, self.scaled(batch.action)], 1), target)
+        said = self._improve_critics(torch.cat([obs, self.inputs.scaled(batch.action)], 1), target)
         seen = [h[:, :size] for h in activations]
         values = self._improve_actor(obs, drawn, seen, shares, temperature)
         self._last = _Last(said, target, values, drawn.log_pi, temperature, alive)
@@ -129,10 +126,7 @@ class SACUpdate:
         temperature: Float[Tensor, ""],
         alive: Float[Tensor, "B"] | None,
     ) -> Float[Tensor, "M B"]:
-        action = drawn.action
-        if alive is not None:
-            # the action of s_abs is 0: decided by where the step leads, not by where it starts
-            action = torch.where(alive.unsqueeze(1) > 0, action, self.scaled(torch.zeros_like(action)))
+        action = self.inputs.followed(drawn.action, alive)
         ahead = self._head.ahead(self._targets(torch.cat([next_obs, action], 1))[0])
         return soft_value(ahead, drawn.log_pi, temperature, alive)
 
@@ -170,18 +164,6 @@ class SACUpdate:
         for nets in (self._actor, self._critics, self._targets):
             nets.refresh()
 
-    def features(
-        self, obs: Float[Tensor, "B O"], absorbing: Bool[Tensor, "B"] | None = None
-    ) -> Float[Tensor, "B F"]:
-        """Normalised observations, zeros in s_abs, and its indicator; the moments are read once."""
-        normal = ((obs - self._mean) / self._std).clamp_(-self._clip, self._clip)
-        if not self._scale:
-            return normal
-        if absorbing is None:
-            return torch.cat([normal, normal.new_zeros(len(obs), 1)], 1)
-        flag = absorbing.unsqueeze(1)
-        return torch.cat([normal.masked_fill_(flag, 0.0), self._scale * flag.to(normal.dtype)], 1)
-
     def metrics(self) -> Metrics:
         """What the last update was like."""
         if (last := self._last) is None:
@@ -208,23 +190,6 @@ class SACUpdate:
         noise = torch.randn(mean.shape, generator=self.rng, device=mean.device)
         bounded = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
         return _Drawn(*squashed(mean, bounded, noise), bounded.exp() * noise, log_std)
-
-    def scaled(self, action: Float[Tensor, "B A"]) -> Float[Tensor, "B A"]:
-        """Environment units to [-1, 1]."""
-        return (action - self._center) / self._half
-
-    def unscaled(self, action: Float[Tensor, "B A"]) -> Float[Tensor, "B A"]:
-        """[-1, 1] to environment units."""
-        return action * self._half + self._center
-
-
-def _alive(absorbing: Bool[Tensor, "B"] | None) -> Float[Tensor, "B"] | None:
-    return None if absorbing is None else (~absorbing).float()
-
-
-def _value_nets(nets: nn.ModuleList | list[nn.Module], dtype: torch.dtype) -> Stack:
-    layers = [linear_layers(net) for net in nets]
-    return Stack([of_one[:-1] for of_one in layers], [of_one[-1:] for of_one in layers], dtype=dtype)
 
 
 def _within_bounds(log_std: Float[Tensor, "B A"]) -> Bool[Tensor, "B A"]:

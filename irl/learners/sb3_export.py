@@ -1,10 +1,11 @@
-"""A policy as a Stable-Baselines3 zip: what `PPO.load` and `SAC.load` read, and nothing more.
+"""A policy as a Stable-Baselines3 zip: what `PPO.load`, `SAC.load` and `TD3.load` read, and nothing more.
 
     gaussian           -> PPO with MlpPolicy
     squashed_gaussian  -> SAC with MlpPolicy
+    deterministic      -> TD3 with MlpPolicy
 
 The actor and its observation normaliser are the policy's. A policy has no value function, so the value
-network (PPO) or the critics (SAC) in the zip are random and untrained, the optimisers are new, and every
+network (PPO) or the critics (SAC, TD3) in the zip are random and untrained, the optimisers are new, and every
 other setting is Stable-Baselines3's default: it predicts at once, and training it further begins with a
 value that knows nothing.
 
@@ -13,11 +14,12 @@ installed. Like every zip of Stable-Baselines3's, it holds pickles: load one onl
 """
 
 import io
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import torch
 from gymnasium.spaces import Box, Discrete
-from stable_baselines3 import PPO, SAC
+from stable_baselines3 import PPO, SAC, TD3
 from torch import Tensor
 
 from irl.core.nets import ACTIVATIONS, CLIP, MIN_STD
@@ -25,7 +27,12 @@ from irl.envs.discrete import OneHot
 from irl.learners.features import NormalisedFeatures
 from irl.policies.policy import Policy
 
-ALGORITHMS: dict[str, type[PPO] | type[SAC]] = {"gaussian": PPO, "squashed_gaussian": SAC, "categorical": PPO}
+ALGORITHMS: dict[str, type[PPO] | type[SAC] | type[TD3]] = {
+    "gaussian": PPO,
+    "squashed_gaussian": SAC,
+    "deterministic": TD3,
+    "categorical": PPO,
+}
 """By a policy's distribution."""
 
 
@@ -47,7 +54,7 @@ def sb3_zip(policy: Policy, observations: Box, actions: Box | Discrete) -> bytes
     return buffer.getvalue()
 
 
-def _untrained(policy: Policy, observations: Box, actions: Box | Discrete) -> PPO | SAC:
+def _untrained(policy: Policy, observations: Box, actions: Box | Discrete) -> PPO | SAC | TD3:
     """A model of the policy's shape, built as SB3's own `load` does it: from spaces, with no environment."""
     shape = {
         "net_arch": list(policy.spec.hidden),
@@ -63,6 +70,7 @@ def _untrained(policy: Policy, observations: Box, actions: Box | Discrete) -> PP
         if isinstance(model, SAC):
             # the "auto" of SB3, which asks an environment
             model.target_entropy = -float(policy.spec.action_dim)
+        if isinstance(model, SAC | TD3):
             # the memory is not saved, its size is
             size, model.buffer_size = model.buffer_size, 1
             model._setup_model()
@@ -77,6 +85,8 @@ def _weights(policy: Policy, names: dict[str, Tensor]) -> dict[str, Tensor]:
     given = {name: torch.from_numpy(value.copy()) for name, value in policy.weights.items()}
     last = len(policy.spec.hidden)
     squashed = policy.spec.distribution == "squashed_gaussian"
+    if policy.spec.distribution == "deterministic":
+        return _of_td3(given, last) | _moments(given, names)
     body, head = ("actor.latent_pi", "actor.mu") if squashed else ("mlp_extractor.policy_net", "action_net")
     found: dict[str, Tensor] = {}
     for part in ("weight", "bias"):
@@ -91,7 +101,22 @@ def _weights(policy: Policy, names: dict[str, Tensor]) -> dict[str, Tensor]:
         found["actor.log_std.bias"] = given["log_std"]
     elif squashed:
         found |= {f"actor.log_std.{part}": given[f"log_std.{part}"] for part in ("weight", "bias")}
-    # actor and critics have an extractor each, or share one under several names
+    return found | _moments(given, names)
+
+
+def _of_td3(given: Mapping[str, Tensor], last: int) -> dict[str, Tensor]:
+    """Of the actor, and of its target, which begins where it is."""
+    found: dict[str, Tensor] = {}
+    for part in ("weight", "bias"):
+        for i in range(last + 1):
+            for actor in ("actor", "actor_target"):
+                found[f"{actor}.mu.{2 * i}.{part}"] = given[f"layers.{i}.{part}"]
+    return found
+
+
+def _moments(given: Mapping[str, Tensor], names: Iterable[str]) -> dict[str, Tensor]:
+    """Actor and critics have an extractor each, or share one under several names."""
+    found: dict[str, Tensor] = {}
     for name in names:
         if name.endswith("normaliser.mean"):
             found[name] = given["obs_mean"]

@@ -11,13 +11,13 @@ bfloat16 instructions, a 256 x 256 x 256 product takes half the time of a float3
 Nothing here is known to autograd: at these sizes its bookkeeping costs as much as the products.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from irl.core.flat import Tied, flattened, views
+from irl.core.flat import Tied, flattened, linear_layers, views
 from irl.core.phi import PHI
 
 
@@ -82,6 +82,12 @@ class Stack(Tied):
         for i in range(len(activations) - 2, -1, -1):
             g = self.times_slope(g, activations[i + 1]) @ self.weights[2 * i]
         return g.float()
+
+
+def stacked(nets: Iterable[nn.Module], dtype: torch.dtype) -> Stack:
+    """Whole networks, with ReLU between their layers."""
+    layers = [linear_layers(net) for net in nets]
+    return Stack([of_one[:-1] for of_one in layers], [of_one[-1:] for of_one in layers], dtype=dtype)
 
 
 def _shapes(layer: Sequence[nn.Linear], n: int) -> list[torch.Size]:

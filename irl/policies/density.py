@@ -29,7 +29,11 @@ def log_pi(
 
     Args:
         least_log_std: a smaller log deviation counts as this one.
+    Raises:
+        ValueError: the policy is deterministic.
     """
+    if spec.distribution == "deterministic":
+        raise ValueError("a deterministic policy has no density, so no log pi")
     clip, phi = float(weights.get("obs_clip", CLIP)), PHI[spec.activation]
     x = ((batch.obs - weights["obs_mean"]) / weights["obs_std"]).clamp(-clip, clip)
     for i in range(len(spec.hidden)):
@@ -54,11 +58,13 @@ class Density(nn.Module):
     """log pi of a batch's own actions under a policy that does not change (`log_pi`)."""
 
     def __init__(self, policy: Policy) -> None:
-        """Raises ValueError for a choice of actions, which has probabilities and no density."""
+        """Raises ValueError for a choice of actions, and for a policy that never draws: no densities."""
         super().__init__()
         self.spec = policy.spec
         if self.spec.distribution == "categorical":
             raise ValueError(f"a choice of actions has no density, and {policy!r} makes one")
+        if not policy.draws:
+            raise ValueError(f"a deterministic policy has no density, and {policy!r} is one")
         for name, value in policy.weights.items():
             self.register_buffer(name.replace(".", "_"), torch.from_numpy(value.copy()))
         self._names = list(policy.weights)

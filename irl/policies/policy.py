@@ -3,6 +3,7 @@
     x = clip((obs - mean) / std, -c, c);  m = mlp(x)
     gaussian:           action = clip(m, low, high)
     squashed_gaussian:  action = low + (tanh(m) + 1) / 2 * (high - low)
+    deterministic:      the same action, and nothing is ever drawn
     categorical:        action = the row of zeros with a one where m is largest
 
 Saved as one safetensors file whose header holds the specification as JSON. About 15 microseconds a
@@ -34,7 +35,7 @@ def _relu(x: np.ndarray) -> np.ndarray:
 
 # named functions, so that a policy can be sent to another process
 _ACTIVATIONS = {"tanh": np.tanh, "relu": _relu}
-_DISTRIBUTIONS = ("gaussian", "squashed_gaussian", "categorical")
+_DISTRIBUTIONS = ("gaussian", "squashed_gaussian", "deterministic", "categorical")
 
 
 @dataclass(frozen=True)
@@ -47,16 +48,17 @@ class PolicySpec:
     hidden: tuple[int, ...]
     activation: str
     distribution: str
-    """`gaussian` (clipped to the bounds), `squashed_gaussian` (tanh, scaled to the bounds), or
-    `categorical` (a choice of actions, each a row with a single one)."""
+    """`gaussian` (clipped to the bounds), `squashed_gaussian` (tanh, scaled to the bounds), `deterministic`
+    (the same, without a deviation), or `categorical` (a choice of actions, each a row with a single one)."""
 
 
 class Policy:
     """An exported policy: call it with an observation to get the mean action in environment units.
 
     Weights are `layers.<i>.weight (out, in)`, `layers.<i>.bias`, `log_std (A,)` or, for a
-    state-dependent one, `log_std.weight (A, H)` and `log_std.bias` (a choice has neither), `obs_mean`,
-    `obs_std (O,)`, `action_low` and `action_high (A,)`, and `obs_clip ()` unless the bound is 10.
+    state-dependent one, `log_std.weight (A, H)` and `log_std.bias` (a choice and a deterministic one have
+    neither), `obs_mean`, `obs_std (O,)`, `action_low` and `action_high (A,)`, and `obs_clip ()` unless the
+    bound is 10.
     """
 
     def __init__(self, spec: PolicySpec, weights: dict[str, np.ndarray]) -> None:
@@ -79,13 +81,20 @@ class Policy:
         """The deterministic action."""
         return self._bounded(self._mean(self._features(obs)))
 
+    @property
+    def draws(self) -> bool:
+        """Whether there is a distribution to draw from."""
+        return self.spec.distribution != "deterministic"
+
     def sample(self, obs: Float[np.ndarray, "O"], rng: np.random.Generator) -> Float[np.ndarray, "A"]:
-        """An action drawn from the policy's own distribution."""
+        """An action drawn from the policy's own distribution; the one action of a deterministic policy."""
         features = self._features(obs)
         mean = self._mean(features)
         if self.spec.distribution == "categorical":
             # the largest of logits with Gumbel noise is drawn with the probability that they say
             return self._bounded(mean + rng.gumbel(size=len(mean)))
+        if not self.draws:
+            return self._bounded(mean)
         std = np.exp(self._log_std(features))
         noise = rng.standard_normal(len(mean), dtype=np.float32)
         return self._bounded(mean + std * noise)
@@ -111,7 +120,7 @@ class Policy:
     def _bounded(self, action: np.ndarray) -> np.ndarray:
         if self.spec.distribution == "categorical":
             return (np.arange(len(action)) == np.argmax(action)).astype(np.float32)
-        if self.spec.distribution == "squashed_gaussian":
+        if self.spec.distribution in ("squashed_gaussian", "deterministic"):
             return self._low + (np.tanh(action) + 1.0) / 2.0 * (self._high - self._low)
         return np.minimum(np.maximum(action, self._low), self._high)
 
@@ -126,9 +135,9 @@ class Policy:
             expected["obs_clip"] = ()
         for i, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
             expected |= {f"layers.{i}.weight": (outputs, inputs), f"layers.{i}.bias": (outputs,)}
-        if "log_std" in self.weights:
+        if "log_std" in self.weights and self.draws:
             expected["log_std"] = sizes[-1:]
-        elif spec.distribution != "categorical":
+        elif spec.distribution in ("gaussian", "squashed_gaussian"):
             expected |= {"log_std.weight": (sizes[-1], sizes[-2]), "log_std.bias": sizes[-1:]}
         for name, shape in expected.items():
             found = self.weights[name].shape if name in self.weights else None

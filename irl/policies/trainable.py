@@ -5,6 +5,7 @@ and deviations: moments of observations and bounds of actions stay.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -65,13 +66,21 @@ def fresh_policy(
     for i, layer in enumerate(linear_layers(net)):
         weights[f"layers.{i}.weight"] = layer.weight.detach().numpy()
         weights[f"layers.{i}.bias"] = layer.bias.detach().numpy()
-    if spec.distribution != "categorical":
+    if spec.distribution in ("gaussian", "squashed_gaussian"):
         weights["log_std"] = np.full(spec.action_dim, log_std, dtype=np.float32)
     weights |= {"obs_mean": normaliser.mean.cpu().numpy(), "obs_std": normaliser.std.cpu().numpy()}
     if normaliser.clip != CLIP:
         weights["obs_clip"] = np.float32(normaliser.clip)  # pyright: ignore[reportArgumentType]
     weights |= {"action_low": bounds[0], "action_high": bounds[1]}
     return Policy(spec, weights)
+
+
+def drawing(policy: Policy, log_std: float = -0.5) -> Policy:
+    """The policy, and where it is deterministic the same with a deviation, so that it has a likelihood."""
+    if policy.draws:
+        return policy
+    spec = replace(policy.spec, distribution="squashed_gaussian")
+    return Policy(spec, policy.weights | {"log_std": np.full(spec.action_dim, log_std, np.float32)})
 
 
 def _flat(name: str) -> str:

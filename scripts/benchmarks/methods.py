@@ -25,11 +25,14 @@ RESULTS = Path(__file__).parent / "results"
 EPISODES = 25
 
 
+Method = Literal["gail", "gail-sac", "gail-td3", "dac", "dac-td3", "airl", "airl-sac"]
+
+
 @dataclass(frozen=True)
 class Settings:
     """Which cells to run."""
 
-    method: Annotated[Literal["gail", "gail-sac", "dac", "airl", "airl-sac"], tyro.conf.Positional]
+    method: Annotated[Method, tyro.conf.Positional]
     """Name of the `irl train` command."""
     tasks: tuple[str, ...] = ("Hopper-v5",)
     """Gymnasium ids."""

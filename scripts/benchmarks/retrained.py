@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 # methods.py, beside this file
-from methods import RESULTS, irl
+from methods import RESULTS, Method, irl
 
 from irl.core.provenance import command_line
 from irl.core.records import open_run
@@ -27,7 +27,7 @@ from irl.envs.tasks import task_name
 class Settings:
     """Which rewards are handed on."""
 
-    method: Annotated[Literal["gail", "gail-sac", "dac", "airl", "airl-sac"], tyro.conf.Positional]
+    method: Annotated[Method, tyro.conf.Positional]
     """Whose runs."""
     tasks: tuple[str, ...] = ("Hopper-v5",)
     """Gymnasium ids."""
@@ -37,7 +37,7 @@ class Settings:
     """Which snapshots: shares of a run's steps."""
     parts: tuple[str, ...] = ()
     """Of AIRL's reward: g, f, f-log-pi."""
-    algo: Literal["ppo", "sac"] = "ppo"
+    algo: Literal["ppo", "sac", "td3"] = "ppo"
     """Who learns."""
     steps: int = 500_000
     """Environment steps of the fresh policy."""

@@ -10,6 +10,7 @@ from irl.algorithms.interleaved import Interleaved, InterleavedConfig, mixed
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, Transitions, from_episodes
 from irl.learners.sac import SACConfig, SACLearner
+from irl.learners.td3 import TD3Config, TD3Learner
 from tests import pointmass
 
 SMALL = SACConfig(steps_per_round=100, learning_starts=100, batch_size=16, hidden=(16,))
@@ -42,6 +43,13 @@ class Told:
         raise AssertionError("not asked")
 
 
+def with_td3(told: Told) -> Interleaved:
+    small = TD3Config(steps_per_round=100, learning_starts=100, batch_size=16, hidden=(16,))
+    learner = TD3Learner("Cliff-v0", [0], small, seed=0, total_steps=400, absorbing_scale=10.0)
+    expert = from_episodes(pointmass.demonstrations(2))
+    return Interleaved(learner, told, expert, InterleavedConfig(), torch_stream(0, "minibatches"))
+
+
 def loop(told: Told, every: int = 1, scale: float = 10.0) -> Interleaved:
     learner = SACLearner("Cliff-v0", [0], SMALL, seed=0, total_steps=400, absorbing_scale=scale)
     expert = from_episodes(pointmass.demonstrations(2))
@@ -72,6 +80,17 @@ def test_the_discriminator_learns_from_each_batch_before_it_rewards_it() -> None
     assert "discriminator/loss" not in rounds[0].metrics
     assert rounds[1].metrics["discriminator/loss"] == pytest.approx(50.5)
     assert rounds[2].metrics["discriminator/loss"] == pytest.approx(150.5)
+
+
+def test_a_rest_that_fills_no_round_is_played_too() -> None:
+    assert [round_.env_steps for round_ in loop(Told()).rounds(250)] == [100, 200, 300]
+
+
+def test_a_learner_without_log_pi_is_never_asked_for_it() -> None:
+    told = Told()
+    rounds = list(with_td3(told).rounds(300))
+    assert [name for name, _ in told.calls] == ["update", "reward"] * 200
+    assert {"td3/actor_loss", "td3/critic_loss"} <= rounds[-1].metrics.keys()
 
 
 def test_every_second_update_is_half_as_many() -> None:

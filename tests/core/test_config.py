@@ -15,7 +15,17 @@ from irl.core.errors import UserError
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
-from irl.experiment.configs import AIRLRun, BCRun, DACRun, ExpertRun, GAILRun, GAILSACRun, Watch
+from irl.experiment.configs import (
+    AIRLRun,
+    BCRun,
+    DACRun,
+    DACTD3Run,
+    ExpertRun,
+    GAILRun,
+    GAILSACRun,
+    GAILTD3Run,
+    Watch,
+)
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 
@@ -204,7 +214,11 @@ EXPERT = ExpertRun("Hopper-v5", "expert", 10, 1, Path("runs/e"), PPO, WATCH, "cp
 
 
 @pytest.mark.parametrize(
-    "config", [GAIL, GAIL.resolved(), CHANGED, EXPERT, GAILSACRun("A-v1"), DACRun("A-v1"), BCRun("A-v1")]
+    "config",
+    [
+        *(GAIL, GAIL.resolved(), CHANGED, EXPERT),
+        *(made("A-v1") for made in (GAILSACRun, GAILTD3Run, DACRun, DACTD3Run, BCRun)),
+    ],
 )
 def test_the_settings_of_a_run_come_back_through_json(config: Any) -> None:
     assert through_json(config) == config

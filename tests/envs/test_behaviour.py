@@ -1,5 +1,6 @@
 """What is done to a policy's actions is what was asked for, and the same for the same episode."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from irl.core.types import Episode
 from irl.envs.behaviour import Behaviour, behaving
 from irl.envs.make import make
 from irl.envs.rollouts import record
+from irl.policies.policy import Policy
 from tests import pointmass
 
 STILL = np.zeros(2)
@@ -53,6 +55,10 @@ def test_draws_are_of_the_policys_own_distribution() -> None:
     assert found.std() == pytest.approx(np.exp(-2), rel=0.04)
     with pytest.raises(UserError, match="no distribution"):
         actions(Behaviour(stochastic=True), 1)
+    weights = {name: value for name, value in policy.weights.items() if name != "log_std"}
+    of_td3 = Policy(replace(policy.spec, distribution="deterministic"), weights)
+    with pytest.raises(UserError, match="no distribution"):
+        actions(Behaviour(stochastic=True), 1, act=of_td3)
 
 
 def test_an_episode_is_the_same_whatever_was_played_before_it() -> None:

@@ -53,6 +53,7 @@ MISTAKES = {
     "a run that is not there": ("evaluate nowhere", ["nowhere", "config.json"]),
     "resuming what is no run": ("train --resume nowhere", ["nowhere"]),
     "a config that is not there": ("train --config nowhere.json --out run", ["nowhere.json"]),
+    "AIRL with TD3": (f"train airl-td3 --env-id {TASK}", ["no log pi", "irl train airl-sac"]),
     "train without a method": ("train", ["irl train gail", "--resume"]),
     "an unknown command": ("imitate gail", ["imitate", "train gail"]),
     "an unknown dataset to show": ("demos show irl/hopper/nothing-v0", ["irl/hopper/nothing-v0"]),

@@ -7,7 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
-from stable_baselines3 import PPO
+from stable_baselines3 import PPO, TD3
 
 import irl
 from irl.algorithms.adversarial import ScheduleConfig
@@ -78,6 +78,7 @@ def test_gail_teaches_a_ready_made_ppo_the_task() -> None:
         ({"method": "dac"}, "indicator of the absorbing state.*use: irl train dac"),
         ({"method": "bc"}, "unknown method 'bc'; expected 'gail' or 'airl'"),
         ({"method": "airl", "discriminator": GAILConfig()}, "GAILConfig are no settings of airl"),
+        ({"model": lambda: TD3("MlpPolicy", envs(n=1)), "method": "airl"}, "TD3's policy has one action for"),
         ({"schedule": InterleavedConfig()}, "PPO's schedule is a ScheduleConfig"),
         ({"model": a_sac, "schedule": ScheduleConfig()}, "SAC's schedule is an InterleavedConfig"),
         ({"model": lambda: a_ppo(ent_coef=0.1), "method": "airl"}, "entropy would be paid twice"),

@@ -42,7 +42,7 @@ def test_it_makes_what_is_trained(name: str, home: Path) -> None:
     config = run(name, TASK)
     demos = load_demos(DATASET, episodes=4, root=home / "datasets")
     learner = config.learner
-    if learner.KIND == "sac":
+    if learner.KIND in ("sac", "td3"):
         learner = replace(learner, products="float32", buffer_size=100)
     algorithm = build.imitation(replace(config, steps=100, learner=learner), demos.episodes)
     algorithm.learner.close()
@@ -60,7 +60,7 @@ def test_typed_settings_go_over_it_and_the_run_says_which_it_was(
         with pytest.raises(SystemExit):
             irl("train", "gail", "--env-id", TASK, *words)
     said = capsys.readouterr().err
-    assert "irl train dac --preset dac-paper" in said
+    assert "irl train dac-td3 --preset dac-paper" in said
     assert "there are: dac-paper" in said
 
 

@@ -17,9 +17,10 @@ from irl.core.records import open_run
 from irl.core.types import Transitions
 from irl.experiment import build, play
 from irl.experiment.cli import main
-from irl.experiment.configs import OFF_POLICY, RetrainRun, Watch
+from irl.experiment.configs import OFF_POLICY, OFF_POLICY_TD3, RetrainRun, Watch
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
+from irl.learners.td3 import TD3Config
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
 from irl.rewards.maps import MAPS
@@ -81,7 +82,7 @@ def equal(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:
     return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
 
 
-def settings(learner: PPOConfig | SACConfig, env_id: str = TASK) -> RetrainRun:
+def settings(learner: PPOConfig | SACConfig | TD3Config, env_id: str = TASK) -> RetrainRun:
     watch = Watch(eval_every=3)
     return RetrainRun(Path("run"), 128, env_id, 400, 3, Path("out"), learner, watch, "cpu", 2)
 
@@ -245,7 +246,7 @@ def test_ppo_is_paid_what_the_absorbing_state_pays_where_the_task_ended() -> Non
 
 
 def test_the_settings_come_back_from_json() -> None:
-    for learner in (PPOConfig(lr=1e-3), OFF_POLICY):
+    for learner in (PPOConfig(lr=1e-3), OFF_POLICY, OFF_POLICY_TD3):
         config = settings(learner)
         assert from_json(RetrainRun, json.loads(json.dumps(to_json(config)))) == config
 

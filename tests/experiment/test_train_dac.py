@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from safetensors.numpy import load_file
+from stable_baselines3 import TD3
 
 import irl as package
 from irl.core import files
@@ -27,6 +28,10 @@ SETTINGS = {
     "watch.eval-episodes": 2,
 }
 SMALL = [f"--{name}={value}" for name, value in SETTINGS.items()] + ["--watch.no-progress"]
+
+
+RETRAINED = ["--steps=300", "--td3.steps-per-round=100", "--td3.learning-starts=150", "--td3.hidden=16"]
+RETRAINED += ["--watch.no-progress", "--watch.eval-episodes=2"]
 
 
 @pytest.fixture
@@ -52,7 +57,7 @@ def same(a: Path, b: Path) -> bool:
     return all(np.array_equal(x, y) for x, y in zip(ends(a), ends(b), strict=True))
 
 
-@pytest.mark.parametrize("method", ["dac", "gail-sac"])
+@pytest.mark.parametrize("method", ["dac", "gail-sac", "dac-td3"])
 def test_the_same_seed_is_the_same_run_watched_or_not(method: str, train: Train) -> None:
     unwatched = ("--watch.eval-every=0", "--watch.eval-episodes=0", "--watch.no-tensorboard")
     first, again = train(method, "first"), train(method, "again", *unwatched)
@@ -86,3 +91,16 @@ def test_a_run_is_evaluated_and_its_reward_and_policy_can_be_used(train: Train, 
     rows = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     assert "discriminator/loss" not in rows[0]
     assert {"discriminator/loss", "discriminator/accuracy_expert", "sac/critic_loss"} <= set(rows[-1])
+
+
+def test_td3_goes_on_from_a_cloned_policy_and_is_exported(train: Train, irl: Command) -> None:
+    run = train("gail-td3", "run", "--warm-start.updates=20")
+    rows = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
+    assert {"td3/actor_loss", "td3/critic_loss"} <= set(rows[-1])
+    policy = load_policy(run / "snapshots" / "000000700" / "policy.safetensors")
+    irl("export", run, "--out", "policy.zip")
+    obs = np.array([0.5, -0.5])
+    predicted, _ = TD3.load("policy.zip", device="cpu").predict(obs, deterministic=True)
+    np.testing.assert_allclose(policy(obs), predicted, atol=1e-5)
+    irl("retrain", run, "--algo=td3", "--out", "again", *RETRAINED)
+    assert files.read_json(Path("again/retrain.json"))["algorithm"] == "td3"

@@ -1,15 +1,21 @@
 """Switches from the command line to a saved reward that is read and judged."""
 
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 import torch
 
+from irl.algorithms.adversarial import ReplayedScheduleConfig
+from irl.algorithms.interleaved import InterleavedConfig
 from irl.core import files
 from irl.core.records import open_run
 from irl.core.types import from_episodes
 from irl.demos.load import load_demos
+from irl.discriminators.airl import AIRLConfig
+from irl.discriminators.dac import DACConfig
+from irl.discriminators.gail import GAILConfig
 from irl.rewards.artefact import load_reward
 from irl.rewards.ensemble import EnsembleNet
 from tests.experiment.conftest import DATASET, LOOK, QUICK, TASK
@@ -78,3 +84,12 @@ def test_the_scale_and_the_bound_of_rewards_reach_the_learner_and_not_the_saved_
     (newest / "state.safetensors").write_bytes(b"torn")
     irl("train", "--resume", "dac")
     assert (last("dac") / "policy.safetensors").read_bytes() == before
+
+
+def test_every_switch_is_in_the_table_with_its_source() -> None:
+    """Sizes and rates are no switches: every paper has its own."""
+    sizes = {"hidden", "potential_hidden", "lr", "batch_size", "epochs", "every"}
+    table = (Path(__file__).parents[2] / "scripts" / "benchmarks" / "SWITCHES.md").read_text(encoding="utf-8")
+    configs = (GAILConfig, DACConfig, AIRLConfig, ReplayedScheduleConfig, InterleavedConfig)
+    names = {field.name for config in configs for field in fields(config)} - sizes
+    assert [name for name in sorted(names) if name.replace("_", "-") not in table] == []

@@ -114,7 +114,7 @@ def test_without_a_normaliser_nothing_is_cut_and_with_one_it_is_cut_at_its_bound
     bounds: list[tuple[Normaliser | None, float]] = [(None, NO_CLIP), (Normaliser(3, 4.0), 4.0)]
     for normaliser, bound in bounds:
         ours = SACLearner("Pendulum-v1", [0], SMALL, seed=0, total_steps=600, normaliser=normaliser)
-        seen = ours._update.features(obs)
+        seen = ours._update.inputs.features(obs)
         assert torch.equal(seen, obs.clamp(-bound, bound))
         assert torch.equal(ours.model.actor.features_extractor(obs), seen)
         assert float(ours.policy().weights["obs_clip"]) == bound

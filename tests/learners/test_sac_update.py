@@ -65,7 +65,7 @@ def theirs(given: list[tuple[Transitions, Tensor]]) -> SAC:
             batch, reward = next(left)
             ended = batch.terminated.float()[:, None]
             return ReplayBufferSamples(
-                batch.obs, update.scaled(batch.action), batch.next_obs, ended, reward[:, None]
+                batch.obs, update.inputs.scaled(batch.action), batch.next_obs, ended, reward[:, None]
             )
 
     sb3.replay_buffer = Buffer()  # pyright: ignore[reportAttributeAccessIssue]
@@ -123,7 +123,7 @@ def test_the_networks_that_act_are_the_ones_that_were_trained(dtype: torch.dtype
     )
 
 
-def absorbed(update: SACUpdate, batch: Transitions, flags: tuple[bool, bool]) -> Transitions:
+def absorbed(batch: Transitions, flags: tuple[bool, bool]) -> Transitions:
     """The batch with every row from and to where the flags say."""
     here, there = (torch.full((B,), flag) for flag in flags)
     never = torch.zeros(B, dtype=torch.bool)
@@ -153,7 +153,7 @@ def test_in_the_absorbing_state_actor_and_temperature_learn_nothing_and_critics_
     critic = {name: weight.clone() for name, weight in sb3.critic.state_dict().items()}
     assert isinstance(sb3.log_ent_coef, Tensor)
     temperature = sb3.log_ent_coef.detach().clone()
-    update(absorbed(update, batch, (True, True)), reward, 1e-3)
+    update(absorbed(batch, (True, True)), reward, 1e-3)
     assert all(torch.equal(weight, actor[name]) for name, weight in sb3.actor.state_dict().items())
     assert torch.equal(sb3.log_ent_coef.detach(), temperature)
     assert any(not torch.equal(weight, critic[name]) for name, weight in sb3.critic.state_dict().items())
@@ -169,7 +169,7 @@ def test_the_target_of_a_step_into_the_absorbing_state_has_no_action_and_no_entr
         with torch.no_grad():
             sb3.actor.mu.bias.add_(actors_bias)
             update.refresh()
-        update(absorbed(update, batch, (False, leads_into_absorbing)), reward, 1e-3)
+        update(absorbed(batch, (False, leads_into_absorbing)), reward, 1e-3)
         return sb3.critic.state_dict()
 
     into, other = critics(True, 0.0), critics(True, 5.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.spaces import Box
-from stable_baselines3 import PPO, SAC
+from stable_baselines3 import PPO, SAC, TD3
 
 from irl.core.nets import NO_CLIP, Normaliser, fitted_normaliser
 from irl.learners.ppo import PPOConfig, PPOLearner
@@ -21,7 +21,8 @@ from tests import pointmass
 LOW, HIGH = np.array([-1.0, 0.5], dtype=np.float32), np.array([3.0, 0.75], dtype=np.float32)
 OBS = Box(-np.inf, np.inf, (3,), np.float64)
 ACTION = Box(LOW, HIGH)
-KINDS = ["gaussian", "squashed_gaussian"]
+DRAWN = ["gaussian", "squashed_gaussian"]
+KINDS = [*DRAWN, "deterministic"]
 
 
 def policy(kind: str, hidden: tuple[int, ...] = (8, 5), activation: str = "tanh", **changes) -> Policy:
@@ -35,13 +36,13 @@ def policy(kind: str, hidden: tuple[int, ...] = (8, 5), activation: str = "tanh"
         weights[f"layers.{i}.bias"] = rng.normal(size=sizes[i + 1])
     if kind == "gaussian":
         weights["log_std"] = rng.normal(size=2)
-    else:
+    elif kind == "squashed_gaussian":
         weights |= {"log_std.weight": rng.normal(size=(2, sizes[-2])), "log_std.bias": rng.normal(size=2)}
     weights = {name: value for name, value in (weights | changes).items() if value is not None}
     return Policy(PolicySpec("Any-v0", 3, 2, hidden, activation, kind), weights)
 
 
-def loaded(content: bytes, kind: str, **more) -> PPO | SAC:
+def loaded(content: bytes, kind: str, **more) -> PPO | SAC | TD3:
     return ALGORITHMS[kind].load(io.BytesIO(content), device="cpu", **more)
 
 
@@ -49,7 +50,7 @@ def random_state() -> np.ndarray:
     return np.asarray(np.random.get_state(legacy=False)["state"]["key"])  # noqa: NPY002
 
 
-def same_actions(ours: Policy, theirs: PPO | SAC, n: int = 200) -> set[str]:
+def same_actions(ours: Policy, theirs: PPO | SAC | TD3, n: int = 200) -> set[str]:
     """Checks that they act alike; which bounds were reached."""
     obs = ours.weights["obs_mean"] + 4.0 * np.random.default_rng(0).normal(size=(n, ours.spec.obs_dim))
     acted = np.array([ours(row) for row in obs])
@@ -78,7 +79,7 @@ def test_the_zip_predicts_what_the_policy_does(kind: str, hidden: tuple[int, ...
         np.testing.assert_array_equal(mean.numpy(), ours.weights["obs_mean"])
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", DRAWN)
 def test_its_samples_spread_as_the_policys_do(kind: str) -> None:
     ours = policy(kind)
     theirs = loaded(sb3_zip(ours, OBS, ACTION), kind)
@@ -126,7 +127,7 @@ def test_a_trained_sac_policy_acts_the_same_with_and_without_an_absorbing_state(
     spaces.close()
 
 
-def same_everywhere(ours: Policy, theirs: PPO | SAC, obs: np.ndarray) -> None:
+def same_everywhere(ours: Policy, theirs: PPO | SAC | TD3, obs: np.ndarray) -> None:
     for row in obs:
         predicted, _ = theirs.predict(row, deterministic=True)
         np.testing.assert_allclose(predicted, ours(row), atol=1e-5)
@@ -191,6 +192,7 @@ def test_it_can_be_trained_further(kind: str, tmp_path: Path) -> None:
     one = Policy(PolicySpec("Pendulum-v1", 3, 1, (8, 5), "tanh", kind), weights)
     (tmp_path / "policy.zip").write_bytes(sb3_zip(one, env.observation_space, box))
     quick = {"gaussian": {"n_steps": 64, "batch_size": 32}, "squashed_gaussian": {"learning_starts": 10}}
+    quick["deterministic"] = quick["squashed_gaussian"]
     changes: dict[str, Any] = quick[kind]
     model = ALGORITHMS[kind].load(tmp_path / "policy.zip", env=env, device="cpu", **changes)
     before = {name: value.clone() for name, value in model.policy.state_dict().items()}

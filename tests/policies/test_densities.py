@@ -156,7 +156,7 @@ def test_the_log_pi_of_a_learner_is_the_density_that_its_own_actions_have() -> N
     ours, other = a_sac(), SACLearner("Pendulum-v1", [0], SAC, seed=5, total_steps=400)
     obs = torch.tensor([[1.0, 0.0, 0.5]]).expand(20_000, 3)
     with torch.no_grad():
-        action = ours._update.unscaled(ours._update.sample(ours._update.features(obs)))
+        action = ours._update.inputs.unscaled(ours._update.sample(ours._update.inputs.features(obs)))
     never = torch.zeros(len(obs), dtype=torch.bool)
     batch = Transitions(obs, action, obs, never, never)
     ratio = (other.log_pi(batch) - ours.log_pi(batch)).exp()
