@@ -54,8 +54,8 @@ RULES: tuple[Rule, ...] = (
         "distance (VAL) of the last reward to the hand-written one, which is 0 for the same and 1 for the "
         "opposite, is below the threshold",
         "It asks for nearly what the hand-written reward asks for, on the play that it was held against.",
-        "It asks for something else than the hand-written reward does: it is no substitute for it, whatever "
-        "the other verdicts say.",
+        "It asks for what the hand-written reward asks for in part, or not at all: it is no substitute for "
+        "it, whatever the other verdicts say.",
     ),
     Rule(
         "moved",

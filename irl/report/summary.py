@@ -81,6 +81,8 @@ def _terms(run: RunFiles) -> str:
         return ""
     shares = [(number(row, "share") or 0.0, str(name)) for name, row in weights.items()]
     paid = ", ".join(f"{name} {percent(share)}" for share, name in sorted(shares, reverse=True) if share > 0)
+    shaping = number(run.evaluation, "terms.shaping")
+    paid += f", a potential's shaping {percent(shaping)}" if paid and shaping and shaping >= NOTHING else ""
     rest = percent(max(0.0, 1 - explained))
     return f"What it pays for, of its variance: {paid or 'no term'}; {rest} is nothing the hand-written has."
 
