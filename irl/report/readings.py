@@ -122,14 +122,11 @@ def _correlation(evaluation: Mapping[str, Any], unit: str) -> KeyNumber:
     what = "reward" if unit == "step" else "sum of the learned reward"
     reading = f"Pearson's r and Spearman's ρ{over}: the learned {what} {_agreement(pearson)}"
     reading = reading.replace("the learned sum of the", "the sum of the")
-    return KeyNumber(name, value, f"{reading}; over several kinds of play that is {_easy(evaluation)}.")
-
-
-def _easy(evaluation: Mapping[str, Any]) -> str:
-    """What a correlation over several kinds of play is worth."""
-    within = number(evaluation, "reward.strata.policy.pearson")
+    within = number(evaluation, "reward.strata.policy.pearson") if unit == "step" else None
     but = "" if within is None else f"; within the policy's own steps r = {within:.2f}"
-    return f"mostly the order of the kinds of play, which is easy{but}"
+    # judge.py: over all strata a correlation is mostly their order
+    easy = "over several kinds of play that is mostly their order, which is easy"
+    return KeyNumber(name, value, f"{reading}; {easy}{but}.")
 
 
 def _agreement(correlation: float) -> str:
