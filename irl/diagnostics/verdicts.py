@@ -25,6 +25,11 @@ class Rule:
     silent: str
     """Where it does not."""
 
+    @property
+    def side(self) -> str:
+        """Where a number has to lie for it to fire."""
+        return "above" if self.above else "below"
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -42,6 +47,16 @@ class Verdict:
 
 
 RULES: tuple[Rule, ...] = (
+    Rule(
+        "close",
+        0.15,
+        False,
+        "distance (VAL) of the last reward to the hand-written one, which is 0 for the same and 1 for the "
+        "opposite, is below the threshold",
+        "It asks for nearly what the hand-written reward asks for, on the play that it was held against.",
+        "It asks for what the hand-written reward asks for in part, or not at all: it is no substitute for "
+        "it, whatever the other verdicts say.",
+    ),
     Rule(
         "moved",
         0.2,
@@ -108,6 +123,9 @@ RULES: tuple[Rule, ...] = (
 """Every verdict there is."""
 
 NAMES = tuple(rule.name for rule in RULES)
+WELCOME = ("close", "stable")
+"""Those that are good news where they fire; the others are warnings."""
+BY_NAME = {rule.name: rule for rule in RULES}
 
 
 def verdicts(

@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import torch
+from jaxtyping import Float
 
 from irl.algorithms.probe import STRATA, Probe, read, read_episodes
 from irl.core import statistics
 from irl.core.rng import stream
 from irl.diagnostics.agreement import per_episode, per_step
 from irl.diagnostics.drift import split
+from irl.diagnostics.stack import read as read_anchored
 from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
 
@@ -47,13 +49,8 @@ def judge_reward(reward: LearnedReward, probe: Probe, seed: int) -> dict[str, An
         "steps": steps.n,
         "episodes": episodes.n,
         "strata": {
-            name: {
-                "mean": float(learned[name].mean()),
-                "std": float(learned[name].std()),
-                "steps": len(learned[name]),
-                "hand_written_mean": finite(float(truth[name].mean())),
-                "pearson": finite(per_step(learned[name], truth[name]).pearson),
-            }
+            # with the absorbing state at 0, as wherever else the report shows what a step pays
+            name: _stratum(read_anchored(reward, probe.steps[name]), truth[name])
             for name in STRATA
         },
         "scatter": _scatter(learned, truth if known else None, seed),
@@ -94,6 +91,16 @@ def judge_drift(rewards: Mapping[int, LearnedReward], probe: Probe) -> dict[str,
 def finite(value: float) -> float | None:
     """The number, or None where it is not one: JSON has no NaN."""
     return value if math.isfinite(value) else None
+
+
+def _stratum(learned: Float[np.ndarray, "B"], truth: Float[np.ndarray, "B"]) -> dict[str, Any]:
+    return {
+        "mean": float(learned.mean()),
+        "std": float(learned.std()),
+        "steps": len(learned),
+        "hand_written_mean": finite(float(truth.mean())),
+        "pearson": finite(per_step(learned, truth).pearson),
+    }
 
 
 def _scatter(

@@ -119,8 +119,9 @@ def _numbers(
     health = drift["health"][-1]
     hygiene = drift["hygiene"][-1]
     ends = any(episode.terminated for episodes in base.values() for episode in episodes)
-    bias = hygiene["survival_bias"]
+    bias, truth = hygiene["survival_bias"], drift["to_truth"][-1]
     numbers = {
+        "close": truth["value"],
         "moved": half[-1] if half else None,
         "stable": max(late) if late and None not in late else None,
         "flat": hygiene["std"],
@@ -128,6 +129,7 @@ def _numbers(
         "survival-biased": abs(bias) if ends and bias is not None else None,
     }
     reasons = {
+        "close": truth.get("reason") or "the distance to the hand-written reward is not known",
         "moved": "there is no snapshot near half of the run that has a distance",
         "stable": "there is no snapshot in the last quarter of the run before its end that has a distance",
         "survival-biased": "no episode of the probe ends early",

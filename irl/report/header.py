@@ -1,9 +1,11 @@
 """What the page says about the run itself: how it was made, and every setting of it."""
 
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from irl.report.citations import METHODS
 from irl.report.folder import RunFiles, lookup, number, texts
 from irl.report.summary import summary
 
@@ -11,7 +13,7 @@ CHIEF_PACKAGES = ("irl", "torch", "stable-baselines3", "gymnasium", "mujoco", "n
 
 
 def header(run: RunFiles) -> str:
-    """Name, method, task and steps, the two sentences to remember, and how to repeat the run."""
+    """Name, method, task, steps and demonstrations, the sentences to remember, and how to repeat the run."""
     evaluation, config, environment = run.evaluation, run.config, run.environment
     kind = evaluation.get("method") or config.get("kind") or "unknown method"
     task = evaluation.get("env_id") or config.get("env_id") or "unknown task"
@@ -20,7 +22,7 @@ def header(run: RunFiles) -> str:
         steps = max((number(row, "env_steps") or 0.0 for row in run.metrics), default=0.0)
     facts = {
         "Seed": config.get("seed"),
-        "Command": environment.get("command"),
+        "Command": _command(environment),
         "Code": _commit(environment),
         "Machine": _joined(environment.get("machine"), _device(environment)),
         "Versions": _versions(environment),
@@ -28,7 +30,8 @@ def header(run: RunFiles) -> str:
     sentences = "".join(f"<li>{escape(sentence)}</li>" for sentence in summary(run))
     return (
         f"<header><h1>{escape(run.name)}</h1>"
-        f'<p class="kind">{escape(str(kind))} on {escape(str(task))}, {steps:,.0f} environment steps</p>'
+        f'<p class="kind">{escape(_title(kind))} on {escape(str(task))}, {steps:,.0f} environment steps'
+        f"{escape(_learned_from(run))}</p>"
         f'<ul class="lead">{sentences}</ul>{_facts(facts)}</header>'
     )
 
@@ -48,6 +51,30 @@ def notes(run: RunFiles, prefix: str = "") -> str:
         return ""
     items = "".join(f"<li>{escape(note)}</li>" for note in dict.fromkeys(found))
     return f'<section id="{prefix}notes" data-section="notes"><h2>Notes</h2><ul>{items}</ul></section>'
+
+
+def _title(kind: object) -> str:
+    """A method as its paper writes it."""
+    name = str(kind)
+    return METHODS[name][0] if name in METHODS else name
+
+
+def _learned_from(run: RunFiles) -> str:
+    """How many demonstrations there were, and of what dataset."""
+    episodes = number(run.evaluation, "references.demonstrations.episodes")
+    if episodes is None:
+        episodes = number(run.config, "demo_episodes")
+    source = run.config.get("demos") or lookup(run.evaluation, "references.demonstrations.source")
+    if episodes is None:
+        return ""
+    of = f" of {source}" if isinstance(source, str) else ""
+    return f", learned from {episodes:.0f} demonstration{'s' * (episodes != 1)}{of}"
+
+
+def _command(environment: Mapping[str, Any]) -> str | None:
+    """As it was typed; Python calls a program that was started by `python -c` just `-c`."""
+    command = environment.get("command")
+    return re.sub(r"^-[cm] ", "irl ", str(command)) if command else None
 
 
 def _commit(environment: Mapping[str, Any]) -> str | None:

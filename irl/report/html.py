@@ -49,14 +49,14 @@ SECTIONS: tuple[Callable[[RunFiles], Panel], ...] = (
 NAMES = {
     "verdicts": "Verdicts",
     "policy": "Policy",
-    "moved": "Moved",
-    "fan": "Fan",
+    "moved": "What moved",
+    "fan": "Reward by play",
     "map": "Map",
     "terms": "Terms",
-    "against": "Against",
+    "against": "Agreement",
     "episodes": "Episodes",
     "crossplay": "Cross-play",
-    "gold": "Gold",
+    "gold": "Proxy and gold",
     "retrain": "Retrain",
     "trust": "Trust",
 }

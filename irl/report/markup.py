@@ -63,12 +63,14 @@ class Page:
             f'<tr><th scope="row">{_shown(row[0])}</th>{"".join(map(_cell, row[1:]))}</tr>'
             for row in table.rows
         )
-        caption = f'<p class="caption">{escape(table.caption)}</p>' if table.caption else ""
+        tag = "summary" if table.folded else "p"
+        caption = f'<{tag} class="caption">{escape(table.caption)}</{tag}>' if table.caption else ""
+        block = "details" if table.folded else "div"
         said = escape(table.caption or "table")
         return (
-            f'<div class="tabled" data-file="{name}-table-{next(self._ids)}">{caption}'
+            f'<{block} class="tabled" data-file="{name}-table-{next(self._ids)}">{caption}'
             f'<div class="wide" tabindex="0" role="region" aria-label="{said}"><table aria-label="{said}">'
-            f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{_take(name)}</div>"
+            f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{_take(name)}</{block}>"
         )
 
 

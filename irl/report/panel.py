@@ -18,6 +18,8 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[Cell]]
     caption: str = ""
+    folded: bool = False
+    """Long and for the few: the caption opens it, and a row is one line."""
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from irl.report.amounts import amount
 from irl.report.folder import column, finite
 from irl.report.palette import DEMONSTRATIONS, STRATA, STRATUM_NAMES, faded, framed
-from irl.report.readings import amount
 
 STEPS = "environment steps"
 LINE_POINTS = 2000
@@ -98,6 +98,31 @@ def learned_against_hand_written(
     figure.update_layout(legend_itemsizing="constant", legend_traceorder="reversed")
     figure.update_traces(hovertemplate="hand-written %{x:.3g}<br>learned %{y:.3g}")
     return framed(figure, "hand-written reward of a step", "learned reward of a step", height=460)
+
+
+def tiles(
+    values: Sequence[Sequence[float | None]],
+    said: Sequence[Sequence[object]],
+    scale: object,
+    hover: str,
+    title: str,
+) -> go.Figure:
+    """A heat map of numbers from 0 to 1; `said` is what `hover` has of each tile."""
+    return go.Figure(
+        go.Heatmap(
+            z=values,
+            x=list(range(len(values[0]) if values else 0)),
+            y=list(range(len(values))),
+            zmin=0,
+            zmax=1,
+            colorscale=scale,
+            xgap=1,
+            ygap=1,
+            customdata=said,
+            hovertemplate=hover,
+            colorbar={"title": {"text": title, "side": "right"}, "thickness": 10, "outlinewidth": 0},
+        )
+    )
 
 
 def _complete_rows(*columns: Sequence[object]) -> list[tuple[float, ...]]:

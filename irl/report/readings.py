@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from irl.report.folder import lookup, number, why_missing
+from irl.report.amounts import amount, percent, spread
+from irl.report.folder import finite, lookup, number, why_missing
 
 MISSING = "not known"
 
@@ -53,28 +54,6 @@ def headline(evaluation: Mapping[str, Any]) -> str:
         reason = why_missing(evaluation, "policy.return_mean").rstrip(".")
         parts = [reason[:1].upper() + reason[1:] + "."]
     return " ".join(parts)
-
-
-def amount(value: float) -> str:
-    """A reward or return with the digits a person reads: 3,477, 18.3, 0.39, 0.0031."""
-    size = abs(value)
-    return f"{value:,.{_digits(value)}f}" if size >= 0.1 else f"{value:.2g}"
-
-
-def percent(share: float) -> str:
-    """A share as a percentage: 0.953 -> 95 %."""
-    return f"{100 * share:.0f} %"
-
-
-def spread(mean: float, std: float | None) -> str:
-    """Mean ± standard deviation, the latter to the digits of the mean and where it is known."""
-    if std is None:
-        return amount(mean)
-    return f"{amount(mean)} ± {std:,.{_digits(mean)}f}" if abs(mean) >= 0.1 else f"{amount(mean)} ± {std:.2g}"
-
-
-def _digits(value: float) -> int:
-    return 0 if abs(value) >= 1000 else 1 if abs(value) >= 10 else 2
 
 
 def _missing(evaluation: Mapping[str, Any], name: str, path: str) -> KeyNumber:
@@ -141,8 +120,13 @@ def _correlation(evaluation: Mapping[str, Any], unit: str) -> KeyNumber:
     count = number(evaluation, f"reward.{unit}s")
     over = "" if count is None else f", over {count:,.0f} {unit}s of expert, policy and random play"
     what = "reward" if unit == "step" else "sum of the learned reward"
-    reading = f"Pearson's r and Spearman's ρ{over}: the learned {what} {_agreement(pearson)}."
-    return KeyNumber(name, value, reading.replace("the learned sum of the", "the sum of the"))
+    reading = f"Pearson's r and Spearman's ρ{over}: the learned {what} {_agreement(pearson)}"
+    reading = reading.replace("the learned sum of the", "the sum of the")
+    within = number(evaluation, "reward.strata.policy.pearson") if unit == "step" else None
+    but = "" if within is None else f"; within the policy's own steps r = {within:.2f}"
+    # judge.py: over all strata a correlation is mostly their order
+    easy = "over several kinds of play that is mostly their order, which is easy"
+    return KeyNumber(name, value, f"{reading}; {easy}{but}.")
 
 
 def _agreement(correlation: float) -> str:
@@ -183,10 +167,8 @@ def _auroc(evaluation: Mapping[str, Any]) -> KeyNumber:
 
 def _last_change(evaluation: Mapping[str, Any]) -> KeyNumber:
     name, path = "Last move of the reward", "drift.changes"
-    changes = lookup(evaluation, path)
-    last = changes[-1] if isinstance(changes, list) and changes else None
+    last, (start, end) = _last_move(evaluation)
     shape, total = number(last, "shape"), number(last, "total")
-    start, end = number(last, "from"), number(last, "to")
     if shape is None or total is None or start is None or end is None:
         return _missing(evaluation, name, path)
     if total <= 0:
@@ -197,3 +179,13 @@ def _last_change(evaluation: Mapping[str, Any]) -> KeyNumber:
         f"Of a mean squared change of {amount(total)} between steps {start:,.0f} and {end:,.0f}; "
         "only shape changes which steps are preferred.",
     )
+
+
+def _last_move(evaluation: Mapping[str, Any]) -> tuple[object, tuple[float | None, float | None]]:
+    """The last change, of the base probe where that was read, and the steps it lies between."""
+    moves, at = lookup(evaluation, "drift.moves"), lookup(evaluation, "drift.snapshots")
+    if isinstance(moves, list) and moves and isinstance(at, list) and len(at) == len(moves) + 1:
+        return moves[-1], (finite(at[-2]), finite(at[-1]))
+    changes = lookup(evaluation, "drift.changes")
+    last = changes[-1] if isinstance(changes, list) and changes else None
+    return last, (number(last, "from"), number(last, "to"))

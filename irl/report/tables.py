@@ -9,10 +9,11 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from irl.report.amounts import amount, spread
 from irl.report.folder import lookup, number, texts
 from irl.report.palette import STRATA, STRATUM_NAMES
 from irl.report.probed import DISTANCES, DRIFT, HEALTH, distance_table, drift_table, health_table
-from irl.report.readings import MISSING, amount, key_numbers, spread
+from irl.report.readings import MISSING, key_numbers
 from irl.report.terms import TERMS, terms_table
 
 

@@ -3,13 +3,16 @@
 Not among the ordinary tests: `make test-browser` brings the browser and runs these.
 """
 
+import json
+from base64 import b64decode
 from collections.abc import Iterator
 from pathlib import Path
+from time import monotonic, sleep
 
 import pytest
 
 from irl.report.html import NAMES, write_report, write_reports
-from tests.browser.chromium import Tab, chromium
+from tests.browser.chromium import ANSWERS_S, Tab, chromium
 from tests.report import whole
 from tests.report.conftest import a_run, an_evaluation
 
@@ -121,6 +124,26 @@ def test_runs_beside_each_other_are_tabs(page: Path, tab: Tab, tmp_path: Path) -
     tab.run("[...document.querySelectorAll('#runs-tab-1')][0].click()")
     tab.scroll_through()
     assert tab.run("document.querySelector('#run1-policy .main-svg') !== null")
+    assert tab.complaints == []
+
+
+def test_a_watched_page_reads_itself_again(tab: Tab, tmp_path: Path) -> None:
+    run = a_run(tmp_path, an_evaluation())
+    watched = write_reports([run], tmp_path / "watched.html", refresh_s=2)
+    tab.open(watched)
+    (run / "evaluation.json").write_text(json.dumps(an_evaluation() | {"run": "it went on"}))
+    write_reports([run], watched, refresh_s=2)
+    began = monotonic()
+    while tab.run("document.querySelector('h1')?.textContent") != "it went on":
+        assert monotonic() - began < ANSWERS_S, "the page stood still"
+        sleep(0.1)
+
+
+def test_paper_has_every_figure_without_a_scroll(page: Path, tab: Tab) -> None:
+    tab.open(page)
+    assert len(b64decode(tab.call("Page.printToPDF", printBackground=True)["data"])) > 100_000
+    shown = "[...document.querySelectorAll('figure.plot')].filter((f) => f.offsetParent)"
+    assert tab.run(f"{shown}.filter((f) => !f.querySelector('svg path')).length") == 0
     assert tab.complaints == []
 
 

@@ -4,9 +4,10 @@ import math
 
 import pytest
 
-from irl.diagnostics.verdicts import NAMES, RULES, verdicts
+from irl.diagnostics.verdicts import NAMES, RULES, WELCOME, verdicts
 
 HEALTHY = {
+    "close": 0.06,
     "moved": 0.02,
     "stable": 0.02,
     "flat": 1.1,
@@ -16,6 +17,7 @@ HEALTHY = {
     "hacked": 0.05,
 }
 SICK = {
+    "close": 0.44,
     "moved": 0.4,
     "stable": 0.3,
     "flat": 1e-3,
@@ -26,18 +28,18 @@ SICK = {
 }
 
 
-def test_there_are_seven_and_each_has_a_case() -> None:
+def test_there_are_eight_and_each_has_a_case() -> None:
     assert set(NAMES) == set(HEALTHY) == set(SICK)
-    assert len(NAMES) == len(RULES) == 7
+    assert len(NAMES) == len(RULES) == 8
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_fires_on_its_planted_case_alone(name: str) -> None:
-    # being at rest is the one good verdict
+    # being close and being at rest are the good verdicts
     healthy = {v.name: v for v in verdicts(HEALTHY)}
-    assert healthy[name].fired == (name == "stable")
+    assert healthy[name].fired == (name in WELCOME)
     planted = {v.name: v for v in verdicts(HEALTHY | {name: SICK[name]})}
-    assert planted[name].fired == (name != "stable")
+    assert planted[name].fired == (name not in WELCOME)
     assert planted[name].sentence != healthy[name].sentence
     others = [other for other in NAMES if other != name]
     assert all(planted[other] == healthy[other] for other in others)

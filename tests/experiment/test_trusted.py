@@ -117,6 +117,7 @@ def test_the_numbers_of_the_verdicts_are_where_their_rules_say() -> None:
         return {"std": 0.5, "survival_bias": bias}
 
     drift = {
+        "to_truth": [{"value": 0.9, "reason": None}, {"value": 0.4, "reason": None}],
         "to_final": [0.9, 0.5, 0.3, 0.1, 0.0],
         "health": [{"held_out": None, "train": {"saturated": 0.7}}],
         "hygiene": [hygiene(0.1), hygiene(-0.9)],
@@ -124,6 +125,7 @@ def test_the_numbers_of_the_verdicts_are_where_their_rules_say() -> None:
     never = ProbeSet(TASK, {"expert": tuple(pointmass.demonstrations(2))})
     numbers, reasons = _numbers([0, 25, 50, 75, 100], drift, never, (0.0, 0.4))
     assert numbers == {
+        "close": 0.4,
         "moved": 0.3,
         "stable": 0.1,
         "flat": 0.5,
@@ -133,6 +135,8 @@ def test_the_numbers_of_the_verdicts_are_where_their_rules_say() -> None:
         "hacked": 0.4,
     }
     assert "ends early" in reasons["survival-biased"]
+    untold = drift | {"to_truth": [{"value": None, "reason": "the hand-written reward is constant"}]}
+    assert "is constant" in _numbers([0, 100], untold | {"to_final": [0.9, 0.0]}, never, "")[1]["close"]
     two, _ = _numbers([0, 100], drift | {"to_final": [0.9, 0.0]}, never, "unknown")
     assert two["moved"] is two["stable"] is None
     fell = rollouts("Cliff-v0", lambda obs: np.ones(2), [0])
@@ -146,18 +150,22 @@ def test_the_gate_is_held_against_every_bound() -> None:
         "distances": {"headline": {"value": None}},
         "cross_play": {"agreement": [{"kendall": {"value": 0.1}}, {"kendall": {"value": 0.7}}]},
         "verdicts": [
+            {"name": "close", "fired": False, "value": 0.44, "threshold": 0.15, "reason": None},
             {"name": "hacked", "fired": True, "value": 0.5, "threshold": 0.2, "reason": None},
             {"name": "flat", "fired": None, "value": None, "threshold": 0.1, "reason": "unknown"},
         ],
     }
     passed = Gate({"score": (0.8, 1.0), "kendall": (0.5, 1.0)}, {"hacked": True})
     assert broken(passed, evaluation) == []
-    failed = Gate({"score": (0.9, np.inf), "distance": (-np.inf, 0.3)}, {"hacked": False, "flat": False})
+    failed = Gate(
+        {"score": (0.9, np.inf), "distance": (-np.inf, 0.3)}, {"hacked": False, "flat": False, "close": True}
+    )
     lines = broken(failed, evaluation)
     assert lines[0] == "score is 0.8, and was to be 0.9 or more"
     assert lines[1] == "distance is not known, and was to be 0.3 or less"
     assert "hacked fired: 0.5 against 0.2" in lines[2]
     assert lines[3] == "flat was not judged: unknown"
+    assert lines[4] == "close did not fire: 0.44 against 0.15"
 
 
 def test_a_broken_bound_is_exit_status_1_and_a_kept_one_0(

@@ -13,6 +13,7 @@ from irl.report.sections.agreement import agreement
 from irl.report.sections.fan import fan
 from irl.report.sections.moved import moved
 from irl.report.sections.policy import policy
+from tests.report import whole
 
 
 def _change(run: Path, evaluation: dict[str, Any]) -> str:
@@ -37,7 +38,7 @@ def test_the_page_holds_what_a_person_looks_for(run: Path) -> None:
     page = write_report(run).read_text()
     for text in (
         "quickstart",
-        "gail on Hopper-v5",
+        "GAIL on Hopper-v5, 122,880 environment steps, learned from 4 demonstrations of irl/hopper/expert-v0",
         "irl train gail",
         "torch 2.13.0",
         "commit dd1a33c0ff",
@@ -46,6 +47,29 @@ def test_the_page_holds_what_a_person_looks_for(run: Path) -> None:
         assert text in page
     for anchor in ("verdicts", "policy", "moved", "fan", "map", "terms", "against", "trust", "notes"):
         assert f'id="{anchor}"' in page
+
+
+def test_the_command_is_one_to_type(run: Path) -> None:
+    environment = json.loads((run / "environment.json").read_text())
+    environment["command"] = "-c train gail --seed 1"
+    (run / "environment.json").write_text(json.dumps(environment))
+    assert "<dd>irl train gail --seed 1</dd>" in write_report(run).read_text()
+
+
+def test_a_tree_that_explains_nothing_is_not_shown(run: Path, evaluation: dict[str, Any]) -> None:
+    whole.write(run, whole.grow(evaluation, 3))
+    assert "a tree ensemble explains 80 % of it" in write_report(run).read_text()
+    page = _change(run, whole.grow(evaluation, 3) | {"residual": {"r2": -3.2, "features": [{"name": "x"}]}})
+    assert "320 %" not in page
+    assert "a tree ensemble explains none of it" in page
+
+
+def test_a_verdict_says_on_which_side_its_threshold_is(run: Path, evaluation: dict[str, Any]) -> None:
+    page = _change(run, whole.grow(evaluation, 3))
+    for words in ("good below 0.2", "warns above 0.2", "Only close says"):
+        assert words in page
+    evaluation["verdicts"] = [{"name": "hacked", "fired": False, "value": 0.0, "threshold": 0.2}]
+    assert "None of them says" in _change(run, evaluation)
 
 
 def test_writing_twice_gives_the_same_page(run: Path) -> None:

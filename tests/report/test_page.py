@@ -181,6 +181,7 @@ def test_several_runs_lie_beside_each_other(everything: Path, tmp_path: Path) ->
     assert page.count("plotly.js v") == 1
     assert 'id="run0-policy"' in page
     assert 'id="run1-policy"' in page
+    assert "says little with fewer than 5 of them" in page
     overlay = figures(page)[0]["data"]
     thick = [trace["name"] for trace in overlay if trace["line"]["width"] == 3]
     assert thick == ["gail, Hopper-v5 (2 runs)", "airl, Hopper-v5 (1 run)"]

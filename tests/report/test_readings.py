@@ -2,7 +2,8 @@ from typing import Any
 
 import pytest
 
-from irl.report.readings import MISSING, amount, headline, key_numbers
+from irl.report.amounts import amount
+from irl.report.readings import MISSING, headline, key_numbers
 
 
 @pytest.mark.parametrize(
@@ -49,3 +50,18 @@ def test_what_is_not_known_has_the_reason_of_the_file(evaluation: dict[str, Any]
 def test_a_reward_that_stood_still_is_said_to(evaluation: dict[str, Any]) -> None:
     evaluation["drift"]["changes"][-1].update(offset=0.0, scale=0.0, shape=0.0, total=0.0)
     assert "stood still" in key_numbers(evaluation)[-1].reading
+
+
+def test_the_last_move_is_the_one_that_the_figure_shows(evaluation: dict[str, Any]) -> None:
+    at = evaluation["drift"]["snapshots"]
+    move = {"offset": 0.9, "scale": 0.06, "shape": 0.04, "total": 1.0}
+    evaluation["drift"]["moves"] = [move] * (len(at) - 1)
+    assert key_numbers(evaluation)[-1].value == "4 % shape"
+
+
+def test_a_correlation_over_several_kinds_of_play_says_what_it_is_within_one(
+    evaluation: dict[str, Any],
+) -> None:
+    evaluation["reward"]["strata"]["policy"]["pearson"] = 0.62
+    rows = {row.name: row for row in key_numbers(evaluation)}
+    assert "within the policy's own steps r = 0.62" in rows["Agreement per step"].reading

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +34,27 @@ def test_the_page_begins_with_what_it_comes_to(run: Path, evaluation: dict[str, 
         "95 % of pairs of policies",
         "88 % or more",
         "40 % of",
-        "Warnings: hacked.",
+        "Warnings: not close, hacked.",
+        "20 episodes of one training seed",
+        "forward 60 %",
+        "30 % is nothing the hand-written has",
+        "No reward of this kind can say the task.",
     ):
         assert words in text, words
+
+
+def test_a_reward_that_was_nearer_before_is_said_to_have_gone_away(
+    run: Path, evaluation: dict[str, Any]
+) -> None:
+    drift = {"snapshots": [0, 10, 20], "to_truth": [{"value": v} for v in (0.5, 0.1, 0.2)], "outside": [0.0]}
+    evaluation["drift"] |= drift
+    (run / "evaluation.json").write_text(json.dumps(evaluation))
+    text = " ".join(summary(read_run(run)))
+    assert "nearer before (0.10 at step 10)" in text
+    assert "outside the probe" not in text
+    drift["to_truth"][2]["value"] = 0.12
+    (run / "evaluation.json").write_text(json.dumps(evaluation))
+    assert "nearer before" not in " ".join(summary(read_run(run)))
 
 
 def test_what_is_not_known_is_left_out_of_it(run: Path) -> None:

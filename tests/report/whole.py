@@ -117,6 +117,7 @@ def trusted(steps: list[int], rng: np.random.Generator) -> dict[str, Any]:
     rule = {"threshold": 0.2, "rule": "the distance is above the threshold", "reason": None}
     return {
         "verdicts": [
+            rule | {"name": "close", "fired": False, "value": 0.2174, "sentence": "Something else."},
             rule | {"name": "hacked", "fired": True, "value": 0.375, "sentence": "True return fell."},
             rule | {"name": "stable", "fired": True, "value": 0.0625, "sentence": "It has come to rest."},
             rule | {"name": "flat", "fired": None, "value": None, "sentence": "", "reason": "no policy"},

@@ -135,7 +135,8 @@ def _residuals(run: RunFiles) -> Table | None:
     return Table(
         head,
         shown,
-        "Largest disagreements: steps furthest from one line through all, two an episode at most",
+        "Largest disagreements: the steps furthest from one line through all, two an episode at most",
+        folded=True,
     )
 
 

@@ -14,6 +14,8 @@ from irl.report.plots import STEPS, thinned
 
 POINTS = 120
 """Steps at which a mean over seeds is taken."""
+FEW = 5
+"""Runs below which an interval over them is hardly one: of two it is the two."""
 Curve = tuple[list[float], list[float]]
 
 
@@ -167,4 +169,6 @@ def _by_method(runs: Sequence[RunFiles]) -> Table:
             middle, low, high = (finite(v) for v in (iqm(np.array(values)), *ends))
             rows.append((method, name, float(len(values)), middle, low, high))
     head = ("method", "measured", "runs", "interquartile mean", "95 % low", "high")
-    return Table(head, rows, "Every method; the interval is over runs")
+    few = any(isinstance(row[2], float) and row[2] < FEW for row in rows)
+    doubt = f", and says little with fewer than {FEW} of them" if few else ""
+    return Table(head, rows, f"Every method; the interval is over runs{doubt}")

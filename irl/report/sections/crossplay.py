@@ -6,11 +6,11 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from irl.report.amounts import amount
 from irl.report.folder import RunFiles, finite, lookup, texts
 from irl.report.palette import ACCENT, OTHERS, SIGNED, framed
 from irl.report.panel import Panel, Table, View, absent, plain, unmeasured
-from irl.report.plots import STEPS, short
-from irl.report.readings import amount
+from irl.report.plots import STEPS, short, tiles
 
 MEASURES = ("pearson", "spearman", "kendall", "regret")
 
@@ -49,21 +49,8 @@ def matrix(found: Mapping[str, Any]) -> go.Figure:
     names = [f"{plain(found['policies'][i].get('name'))} ({amount(_true(found, i))})" for i in order]
     places = list(range(len(names)))
     up = list(range(len(rows)))
-    drawn = go.Figure(
-        go.Heatmap(
-            z=[ranked(row) for row in rows],
-            x=places,
-            y=up,
-            customdata=rows,
-            zmin=0,
-            zmax=1,
-            colorscale=SIGNED,
-            xgap=1,
-            ygap=1,
-            hovertemplate="%{x}: learned return %{customdata:.4g}, rank %{z:.2f}<extra></extra>",
-            colorbar={"title": {"text": "rank in its row", "side": "right"}, "thickness": 10},
-        )
-    )
+    hover = "%{x}: learned return %{customdata:.4g}, rank %{z:.2f}<extra></extra>"
+    drawn = tiles([ranked(row) for row in rows], rows, SIGNED, hover, "rank in its row")
     framed(drawn, "policy (true return)", "reward of snapshot", height=max(330, 22 * len(rows) + 250))
     every = -(-len(up) // 16)
     drawn.update_yaxes(

@@ -58,7 +58,7 @@ def figure(points: Points, peak: float | None) -> go.Figure:
     if peak is not None:
         drawn.add_vline(x=peak, line={"color": INK, "width": 1, "dash": "dash"}, row="all", col=1)  # pyright: ignore[reportArgumentType]
     drawn.update_xaxes(
-        title_text=f"{STEPS}; dashed: where gold is highest" if peak is not None else STEPS, row=2, col=1
+        title_text=f"{STEPS}; dashed: gold's peak" if peak is not None else STEPS, row=2, col=1
     )
     drawn.update_yaxes(title_text="learned return", row=1, col=1)
     drawn.update_yaxes(title_text="true return", row=2, col=1)
@@ -70,7 +70,7 @@ def _table(run: RunFiles) -> Table:
         "peak_step": "step at which gold is highest",
         "drop": "share of the gain in gold that was lost again by the end",
         "gap": "proxy less gold at the end, in standard deviations",
-        "decoupling_step": "first step of a window in which the two do not rise together",
+        "decoupling_step": "step at which the first stretch begins in which the two do not rise together",
     }
     rows = [(words, number(run.evaluation, f"proxy_gold.{key}")) for key, words in meanings.items()]
     return Table(("measured", "value"), rows, "Over-optimisation")

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from irl.report.folder import RunFiles, finite, lookup
 from irl.report.palette import ACCENT, BLUES, GRID, INK, STRATA, framed
 from irl.report.panel import Panel, Table, View, unmeasured
-from irl.report.plots import short
+from irl.report.plots import short, tiles
 
 TRUTH = "hand-written"
 
@@ -42,21 +42,8 @@ def maps(run: RunFiles) -> Panel:
 def heat(matrix: list[list[Any]], names: list[str]) -> go.Figure:
     """Distances of all pairs."""
     places = list(range(len(names)))
-    drawn = go.Figure(
-        go.Heatmap(
-            z=matrix,
-            x=places,
-            y=places,
-            zmin=0,
-            zmax=1,
-            colorscale=BLUES,
-            xgap=1,
-            ygap=1,
-            customdata=[[f"{a} and {b}" for b in names] for a in names],
-            hovertemplate="%{customdata}: %{z:.3f}<extra></extra>",
-            colorbar={"title": {"text": "distance", "side": "right"}, "thickness": 10, "outlinewidth": 0},
-        )
-    )
+    pairs = [[f"{a} and {b}" for b in names] for a in names]
+    drawn = tiles(matrix, pairs, BLUES, "%{customdata}: %{z:.3f}<extra></extra>", "distance")
     framed(drawn, "snapshot (environment steps)", "", height=430)
     every = max(1, -(-len(names) // 10))
     shown = sorted({*places[::every], places[-1]} - ({places[-2]} if len(names) > 10 else set()))

@@ -30,7 +30,8 @@ def moved(run: RunFiles) -> Panel:
         "has nothing left to say, near 100 % it tells everything apart and the reward is steep."
     )
     if not changes:
-        text = f"What moved is not measured yet (irl evaluate {run.name}). " + text.rpartition("; below, ")[2]
+        below = text.rpartition("; below, ")[2]
+        text = f"What moved is not measured yet (irl evaluate {run.name}). Below, {below}"
     views = [View("steps", (figure(snapshots, changes, health, "linear"),))]
     if len(changes) > 3:
         views.append(View("steps, logarithmic", (figure(snapshots, changes, health, "log"),)))

@@ -24,7 +24,9 @@ def trust(run: RunFiles) -> Panel:
     notes = (f"Not shown: {', '.join(missing)}. To have them: irl evaluate {run.name}",) if missing else ()
     text = (
         "Before a number above is believed: the own error should be near 0 and the negation near 1; a large "
-        "share outside the probe means that the page is silent about what the policy does most."
+        "share outside the probe means that the page is silent about what the policy does most. Covered is a "
+        "kind of play with episodes enough for an interval; policy at 50 % is this run's own policy of the "
+        "snapshot halfway through."
     )
     return Panel("trust", "Trust", text, "trust", tables=tuple(t for t in found.values() if t), notes=notes)
 

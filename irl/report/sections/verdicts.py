@@ -4,14 +4,15 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
+from irl.diagnostics.verdicts import BY_NAME, WELCOME
 from irl.report.folder import RunFiles, finite, lookup, number
 from irl.report.palette import STRATA, STRATUM_NAMES
 from irl.report.panel import Panel, Table, unmeasured
 from irl.report.readings import key_numbers
+from irl.report.verdict import state
 
-WELCOME = ("stable",)
-"""Verdicts that are good news where they fire; the others are warnings."""
 LINKS = {
+    "close": "map",
     "moved": "moved",
     "stable": "map",
     "flat": "fan",
@@ -32,7 +33,7 @@ def verdicts(run: RunFiles) -> Panel:
         return unmeasured(run, anchor, title, "verdicts")
     text = (
         "One card a question: green is as it should be, orange is a warning, grey is not known. Thresholds "
-        "are conventions, not laws: read the number and follow the link to its section."
+        f"are conventions, not laws: read the number and follow the link to its section. {_whether(rows)}"
     )
     if not rows:
         text = f"{unmeasured(run, anchor, title, 'verdicts').text} The numbers that are known:"
@@ -41,14 +42,6 @@ def verdicts(run: RunFiles) -> Panel:
     return Panel(
         anchor, title, text, "verdicts" if rows else "", tables=tables, notes=_chosen(run), html=strip
     )
-
-
-def state(row: Mapping[str, Any]) -> str:
-    """`good`, `warning` or `unknown`."""
-    fired = row.get("fired")
-    if not isinstance(fired, bool):
-        return "unknown"
-    return "good" if fired == (row.get("name") in WELCOME) else "warning"
 
 
 _WORDS = {"good": "✓", "warning": "▲", "unknown": "?"}
@@ -61,7 +54,7 @@ def _card(row: Mapping[str, Any]) -> str:
     fired = "not known" if how == "unknown" else fired
     value, threshold = finite(row.get("value")), finite(row.get("threshold"))
     numbers = "" if value is None else f"<b>{value:.3g}</b>"
-    numbers += "" if threshold is None else f" <span>threshold {threshold:g}</span>"
+    numbers += "" if threshold is None else f" <span>{_bound(name)} {threshold:g}</span>"
     said = row.get("reason") if how == "unknown" and row.get("reason") else row.get("sentence")
     link = f'<a href="#{LINKS[name]}">look</a>' if name in LINKS else ""
     mark = f'<span class="mark" role="img" aria-label="{_SPOKEN[how]}">{_WORDS[how]}</span>'
@@ -70,6 +63,24 @@ def _card(row: Mapping[str, Any]) -> str:
         f'<li class="{how}"><h3>{mark} {escape(name)}: {fired}</h3><p>{escape(str(said or ""))}</p>'
         f'<p class="number">{numbers} {link}</p>{rule}</li>'
     )
+
+
+def _whether(rows: list[Mapping[str, Any]]) -> str:
+    """Whose question that is: all green on a reward far from the hand-written one would mislead."""
+    if any(row.get("name") == "close" for row in rows):
+        return (
+            "Only close says whether the reward asks for what the hand-written one does; the others are of "
+            "the training."
+        )
+    return "None of them says whether the reward asks for what the hand-written one does."
+
+
+def _bound(name: str) -> str:
+    """On which side of the threshold a number is good or bad news."""
+    rule = BY_NAME.get(name)
+    if rule is None:
+        return "threshold"
+    return f"good {rule.side}" if name in WELCOME else f"warns {rule.side}"
 
 
 def _chosen(run: RunFiles) -> tuple[str, ...]:

@@ -10,11 +10,11 @@ from typing import Any
 
 import plotly.graph_objects as go
 
+from irl.report.amounts import amount
 from irl.report.folder import RunFiles, finite, lookup
 from irl.report.markup import controlled, drawing, embedded
 from irl.report.palette import ACCENT, AXIS, INK, LAYOUT, OTHERS
 from irl.report.panel import Panel, plain, unmeasured
-from irl.report.readings import amount
 
 MOST_BYTES = 1_000_000
 """Of the pictures of one episode, as they go into the page."""

@@ -135,16 +135,25 @@ def _table(run: RunFiles, known: Mapping[str, Any]) -> Table:
 
 
 def _notes(run: RunFiles) -> tuple[str, ...]:
-    bonus = number(run.evaluation, "terms.survival_bonus")
-    if bonus is None:
-        return ()
-    return (f"Survival bonus: not ending the episode pays {bonus:+.3g} a step, with the discounted offset.",)
+    bonus, r2 = number(run.evaluation, "terms.survival_bonus"), number(run.evaluation, "residual.r2")
+    notes = (
+        "Weight: in the learned reward's units for one of the term's; standardised: what one deviation of "
+        "the term moves the learned reward by, in deviations of its own; share: of its variance.",
+    )
+    if bonus is not None:
+        notes += (
+            f"Survival bonus: not ending the episode pays {bonus:+.3g} a step, with the discounted offset.",
+        )
+    if r2 is not None and r2 <= 0:
+        notes += ("What the unexplained part depends on was not found: a tree ensemble explains none of it.",)
+    return notes
 
 
 def _residual(run: RunFiles) -> Table | None:
     """What else it pays for: what a tree ensemble finds in the part that no term explains."""
     features, r2 = lookup(run.evaluation, "residual.features"), number(run.evaluation, "residual.r2")
-    if not isinstance(features, list):
+    # a tree that does worse than the mean has found nothing, and its importances mean nothing
+    if not isinstance(features, list) or (r2 is not None and r2 <= 0):
         return None
     rows = [
         (str(lookup(row, "name")), number(row, "importance"))

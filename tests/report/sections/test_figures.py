@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 from irl.report.palette import CHANGES
-from irl.report.sections import compare, crossplay, maps, moved, verdicts, viewer
+from irl.report.sections import compare, crossplay, maps, moved, viewer
+from irl.report.verdict import state
 
 
 def drawn(figure: Any) -> list[Any]:
@@ -42,11 +43,13 @@ def test_the_star_is_where_the_hand_written_reward_is() -> None:
         ("hacked", False, "good"),
         ("stable", True, "good"),
         ("stable", False, "warning"),
+        ("close", True, "good"),
+        ("close", False, "warning"),
         ("flat", None, "unknown"),
     ],
 )
 def test_a_verdict_is_good_news_or_bad(name: str, fired: bool | None, expected: str) -> None:
-    assert verdicts.state({"name": name, "fired": fired}) == expected
+    assert state({"name": name, "fired": fired}) == expected
 
 
 def test_the_mean_of_curves_is_where_all_are() -> None:
