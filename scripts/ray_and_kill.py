@@ -85,8 +85,9 @@ def kill_half_way(running: subprocess.Popen[bytes], run: Path, settings: Setting
     training = int((run / ".lock").read_text())
     worker = parent(training)
     os.kill(worker, signal.SIGKILL)
-    time.sleep(1)
-    gone = not Path(f"/proc/{training}").exists()
+    time.sleep(2)
+    said = subprocess.run(["ps", "-o", "stat=", "-p", str(training)], capture_output=True, text=True).stdout
+    gone = not said.strip() or said.startswith("Z")
     print(f"killed worker {worker} at step {steps:,}; its training is {'gone' if gone else 'still there'}")
     return steps
 

@@ -21,6 +21,7 @@ from irl.core.errors import UserError
 from irl.core.records import open_run
 from irl.demos.load import load_demos
 from irl.envs.tasks import task_name
+from irl.policies import shelf
 
 DATASET = ("--episodes", "25", "--seed", "0")
 """The expert's episodes, of which each cell draws its own."""
@@ -127,6 +128,8 @@ def dataset(task: str, places: Places, processes: Processes) -> None:
     with _held(places.datasets / f".{name}.lock"):
         if (folder / "data").is_dir():
             return
+        # as the command would refuse it, without starting one for each cell
+        shelf.find(task)
         words = ("demos", "generate", "--env-id", task, *DATASET, "--datasets-root", str(places.datasets))
         if status := processes.run([*PROGRAM, *words], log):
             raise Failed(_reason(log, status), status < 0)

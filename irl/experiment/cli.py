@@ -22,6 +22,7 @@ from irl.experiment import (
     reseeded,
     retrain,
     shelved,
+    tabled,
     train,
 )
 from irl.experiment.configs import AIRLRun, AIRLSACRun, BCRun, DACRun, GAILRun, GAILSACRun
@@ -51,6 +52,7 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("report",): (reports.Report, reports.report),
     ("retrain",): (retrain.Retrain, reseeded.retrain),
     ("export",): (export.Export, export.export),
+    ("bench", "table"): (tabled.BenchTable, tabled.bench_table),
     ("bench",): (benched.Bench, benched.bench),
     ("experts", "train"): (experts.TrainExpert, experts.train),
     ("experts", "evaluate"): (shelved.EvaluateExpert, shelved.evaluate),
