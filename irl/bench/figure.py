@@ -110,5 +110,5 @@ def _dashed(arm: Arm) -> bool:
 
 def _scored(result: Result) -> list[tuple[float, float]]:
     score = scorer(result)
-    points = [(steps, score(value)) for steps, value in result["curve"]]
+    points = [(float(steps), score(value)) for steps, value in result["curve"]]
     return [(steps, value) for steps, value in points if math.isfinite(value)]

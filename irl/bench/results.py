@@ -137,8 +137,8 @@ def _reward(found: Mapping[str, Any], snapshot: int | None = None) -> dict[str, 
     }
 
 
-def read_results(folder: Path) -> list[dict[str, Any]]:
-    """Every result in a folder, in the order of its files' names.
+def read_results(folder: Path, cells: Sequence[Cell] = ()) -> list[dict[str, Any]]:
+    """Every result in a folder, in the order of these cells and of its files' names.
 
     Raises:
         UserError: there is none, or one is damaged.
@@ -146,7 +146,8 @@ def read_results(folder: Path) -> list[dict[str, Any]]:
     found = [_read(path) for path in sorted(folder.glob("*.json"))]
     if not found:
         raise UserError(f"{folder} has no result yet; make them with: irl bench {folder.name}")
-    return found
+    order = {cell.name: i for i, cell in enumerate(cells)}
+    return sorted(found, key=lambda result: order.get(Path(result["file"]).stem, len(order)))
 
 
 NEEDED = ("method", "task", "seed", "score", "curve", "wall_s")

@@ -40,7 +40,7 @@ def bench_table(command: BenchTable) -> None:
     """Print the tables, and with --write put them where they belong."""
     grid, cells, folder = _named(command)
     name = folder.name
-    results = read_results(folder)
+    results = read_results(folder, cells)
     said = section(name, results, grid, cells)
     Console().print(said, highlight=False, markup=False, soft_wrap=True)
     if not command.write:
