@@ -17,7 +17,7 @@ WORKERS ?= $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
 # One thread a worker: torch's own threads would only fight over the cores.
 PYTEST := OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -n $(WORKERS) --dist loadfile
 
-.PHONY: help install quickstart check test test-slow test-browser clean
+.PHONY: help install quickstart check test test-slow test-browser test-ray clean
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 
@@ -48,6 +48,10 @@ test-browser: $(STAMP)  ## the report in a headless Chromium, which is installed
 	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium >/dev/null; } \
 	  || { echo "chromium is needed and could not be installed; install it by hand" >&2; exit 1; }
 	@OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -s -m browser tests/browser
+
+test-ray: $(STAMP)  ## a grid on a Ray cluster of two workers, one of them killed; installs Ray, the extra
+	@$(VENV)/bin/python -m pip install -q --disable-pip-version-check --no-input -c constraints.txt --no-build-isolation -e '.[ray]'
+	@OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -q -s -m ray tests/bench
 
 clean:  ## remove caches and builds; runs, datasets and .venv stay
 	rm -rf build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -15,6 +15,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # From the top; a file may import from the levels below its own, and from its own folder.
 LEVELS = (
     {"experiment"},
+    {"bench"},
     {"report"},
     {"algorithms"},
     {"demos", "discriminators", "learners", "diagnostics"},

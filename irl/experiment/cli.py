@@ -1,17 +1,15 @@
 """The command line: one table of commands, each a frozen dataclass that tyro reads."""
 
-import contextlib
 import errno
-import io
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import tyro
 from rich.console import Console
 
 from irl.core.errors import UserError
 from irl.experiment import (
+    benched,
     demonstrations,
     evaluate,
     experts,
@@ -24,6 +22,7 @@ from irl.experiment import (
     reseeded,
     retrain,
     shelved,
+    tabled,
     train,
 )
 from irl.experiment.configs import (
@@ -36,10 +35,9 @@ from irl.experiment.configs import (
     GAILSACRun,
     GAILTD3Run,
 )
-from irl.experiment.imitation_run import AdversarialRun
 from irl.experiment.modules import import_named
 from irl.experiment.play import Interrupted
-from irl.experiment.presets import with_preset
+from irl.experiment.typed import parsed
 
 Run = Callable[[Any], None]
 
@@ -65,6 +63,8 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("report",): (reports.Report, reports.report),
     ("retrain",): (retrain.Retrain, reseeded.retrain),
     ("export",): (export.Export, export.export),
+    ("bench", "table"): (tabled.BenchTable, tabled.bench_table),
+    ("bench",): (benched.Bench, benched.bench),
     ("experts", "train"): (experts.TrainExpert, experts.train),
     ("experts", "evaluate"): (shelved.EvaluateExpert, shelved.evaluate),
     ("experts", "list"): (shelved.ListExperts, shelved.list_experts),
@@ -108,41 +108,9 @@ def _dispatch(words: list[str]) -> None:
     for n in (2, 1):
         if (name := tuple(words[:n])) in COMMANDS and len(name) == n:
             cls, run = COMMANDS[name]
-            run(_parsed(cls, words[n:], f"irl {' '.join(name)}", _default(cls, words[n:])))
+            run(parsed(cls, words[n:], f"irl {' '.join(name)}"))
             return
     _overview(words)
-
-
-def _default(cls: type, words: list[str]) -> Any:
-    """The settings that typed ones go over where a preset is named; None where none is."""
-    if not issubclass(cls, AdversarialRun) or (name := _typed(words, "--preset")) is None:
-        return None
-    # without a task the words are refused in any case
-    env_id = _typed([word.replace("--env_id", "--env-id") for word in words], "--env-id")
-    return with_preset(cls(env_id=env_id), name) if env_id else None
-
-
-def _typed(words: list[str], flag: str) -> str | None:
-    """What follows a flag, the last time that it is typed."""
-    found = None
-    for word, following in zip(words, [*words[1:], ""], strict=True):
-        name, given, value = word.partition("=")
-        if name == flag:
-            found = value if given else following
-    return found
-
-
-def _parsed(cls: type, words: list[str], program: str, default: Any = None) -> Any:
-    """The command that the words say; tyro's boxed complaint as one line."""
-    complaint = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(complaint):
-            return tyro.cli(cls, args=words, prog=program, **({"default": default} if default else {}))
-    except SystemExit as stop:
-        if stop.code in (0, None):
-            raise
-        frame = str.maketrans(dict.fromkeys("╭╮╰╯│─┌┐└┘", " "))
-        raise UserError(complaint.getvalue().translate(frame)) from None
 
 
 def _overview(words: list[str]) -> None:

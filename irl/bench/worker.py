@@ -1,0 +1,188 @@
+"""One cell carried out, from wherever it was left, by commands of irl."""
+
+import fcntl
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from irl.bench import results
+from irl.bench.cells import Cell
+from irl.bench.leash import PROGRAM
+from irl.bench.processes import Processes
+from irl.core import files
+from irl.core.config import to_json
+from irl.core.differences import differences
+from irl.core.errors import UserError
+from irl.core.records import open_run
+from irl.demos.load import load_demos
+from irl.envs.tasks import task_name
+from irl.policies import shelf
+
+DATASET = ("--episodes", "25", "--seed", "0")
+"""The expert's episodes, of which each cell draws its own."""
+LAST_LINES = 4000
+"""Bytes of a log that are looked through for the reason of a failure."""
+_one_at_a_time = threading.Lock()
+# Minari is told its folder by the environment of the process
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where everything is, as full paths: a worker may start in another folder."""
+
+    runs: Path
+    """A run folder and a log for each cell."""
+    datasets: Path
+    peer_python: Path | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a cell."""
+
+    cell: Cell
+    result: dict[str, Any] | None = None
+    why: str = ""
+    """Without a result, the reason."""
+    killed: bool = False
+    """It was ended from outside and would go on."""
+
+
+class Failed(Exception):
+    """A command did not do what it was for."""
+
+    def __init__(self, why: str, killed: bool = False) -> None:
+        super().__init__(why)
+        self.killed = killed
+
+
+def carry_out(cell: Cell, places: Places, processes: Processes) -> Outcome:
+    """Train, or go on training, and judge."""
+    try:
+        begin = {"train": _train, "retrain": _retrain, "peer": _peer}[cell.kind]
+        return Outcome(cell, begin(cell, places, processes))
+    except Failed as failed:
+        return Outcome(cell, why=str(failed), killed=failed.killed)
+    except (UserError, OSError) as error:
+        return Outcome(cell, why=" ".join(str(error).split()))
+
+
+def _train(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:
+    run = places.runs / cell.name
+    _same_cell(cell, places)
+    dataset(cell.task, places, processes)
+    if (run / "config.json").is_file():
+        _irl(cell, places, processes, "train", "--resume", str(run))
+    else:
+        where = ("--out", str(run), "--datasets-root", str(places.datasets))
+        _irl(cell, places, processes, "train", cell.method, *cell.words, *where)
+    if not (run / "evaluation.json").is_file():
+        _irl(cell, places, processes, "evaluate", str(run), "--frames", "0", *cell.evaluate)
+    return results.of_training(cell, run)
+
+
+def _retrain(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:
+    run, source = places.runs / cell.name, places.runs / cell.source
+    _same_cell(cell, places)
+    if not (source / "evaluation.json").is_file():
+        raise UserError(
+            f"the run {cell.source} is not in {places.runs}; train it here, or let every worker see the "
+            f"same --runs"
+        )
+    there = list(open_run(source).snapshots())
+    snapshot = min(there, key=lambda step: abs(step - cell.share * there[-1]))
+    if not (run / "retrain.json").is_file():
+        if (run / "config.json").is_file():
+            _irl(cell, places, processes, "retrain", "--resume", str(run))
+        else:
+            where = ("--snapshot", str(snapshot), "--out", str(run))
+            _irl(cell, places, processes, "retrain", str(source), *where, *cell.words)
+    return results.of_retraining(cell, run, source, snapshot)
+
+
+def _peer(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:
+    run = places.runs / cell.name
+    _same_cell(cell, places)
+    if places.peer_python is None:
+        raise UserError("needs a Python of the peer's own: name it with --peer-python")
+    dataset(cell.task, places, processes)
+    if not (run / "peer.json").is_file():
+        arrays = _arrays(cell, places, run)
+        script = str(Path(cell.script).resolve())
+        words = (cell.method, cell.task, str(arrays), str(cell.seed), str(cell.steps), str(run))
+        python = str(places.peer_python)
+        _ended(cell, places, processes, (python, "-W", "ignore", script, *words, *cell.settings))
+    return results.of_peer(cell, run)
+
+
+def dataset(task: str, places: Places, processes: Processes) -> None:
+    """The expert's episodes, made by the first cell that needs them."""
+    name = task_name(task)
+    folder = places.datasets / "irl" / name / "expert-v0"
+    log = places.runs / f"dataset-{name}.log"
+    with _held(places.datasets / f".{name}.lock"):
+        if (folder / "data").is_dir():
+            return
+        # as the command would refuse it, without starting one for each cell
+        shelf.find(task)
+        words = ("demos", "generate", "--env-id", task, *DATASET, "--datasets-root", str(places.datasets))
+        if status := processes.run([*PROGRAM, *words], log):
+            raise Failed(_reason(log, status), status < 0)
+
+
+def _arrays(cell: Cell, places: Places, run: Path) -> Path:
+    """The episodes that a training of this seed draws, as arrays for those who do not read Minari."""
+    with _one_at_a_time:
+        name = f"irl/{task_name(cell.task)}/expert-v0"
+        episodes = load_demos(name, episodes=cell.episodes, seed=cell.seed, root=places.datasets)
+    arrays: dict[str, Any] = {"episodes": len(episodes)}
+    for i, e in enumerate(episodes):
+        arrays |= {f"obs{i}": e.obs, f"action{i}": e.action, f"reward{i}": e.reward}
+        arrays[f"terminal{i}"] = e.terminated
+    run.mkdir(parents=True, exist_ok=True)
+    np.savez(path := run / "demonstrations.npz", **arrays)
+    return path
+
+
+def _same_cell(cell: Cell, places: Places) -> None:
+    """Go on with a run only where it is of this cell; write down what it is of."""
+    path, asked = places.runs / f"{cell.name}.cell.json", to_json(cell)
+    if path.is_file() and (changed := differences(files.read_json(path), asked)):
+        raise UserError(
+            f"the run {cell.name} was begun as another cell: {'; '.join(changed):.300}; take it out of "
+            f"{places.runs}, or give the grid or the part another name"
+        )
+    files.write_json(path, asked)
+
+
+def _irl(cell: Cell, places: Places, processes: Processes, *words: str) -> None:
+    _ended(cell, places, processes, (*PROGRAM, *words))
+
+
+def _ended(cell: Cell, places: Places, processes: Processes, words: tuple[str, ...]) -> None:
+    log = places.runs / f"{cell.name}.log"
+    if status := processes.run(words, log):
+        raise Failed(_reason(log, status), status < 0 or processes.stopped)
+
+
+def _reason(log: Path, status: int) -> str:
+    """What a command that failed said last, by its log."""
+    if status < 0:
+        return f"killed by signal {-status}"
+    lines = log.read_bytes()[-LAST_LINES:].decode(errors="replace").splitlines()
+    said = [line.removeprefix("irl: ") for line in lines if line.startswith("irl: ")]
+    return (said or [line for line in lines if line.strip()] or [f"exit status {status}"])[-1].strip()
+
+
+@contextmanager
+def _held(path: Path) -> Iterator[None]:
+    """One process at a time; the system lets go when this one dies."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
