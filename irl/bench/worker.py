@@ -39,6 +39,8 @@ class Places:
     """A run folder and a log for each cell."""
     datasets: Path
     peer_python: Path | None = None
+    scripts: Path = Path()
+    """What the path of a peer's script begins at."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,7 @@ def _peer(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:
     dataset(cell.task, places, processes)
     if not (run / "peer.json").is_file():
         arrays = _arrays(cell, places, run)
-        script = str(Path(cell.script).resolve())
+        script = str(places.scripts / cell.script)
         words = (cell.method, cell.task, str(arrays), str(cell.seed), str(cell.steps), str(run))
         python = str(places.peer_python)
         _ended(cell, places, processes, (python, "-W", "ignore", script, *words, *cell.settings))

@@ -144,6 +144,7 @@ def _places(command: Bench, grid: str) -> Places:
         datasets=datasets.expanduser().absolute(),
         # not resolved: the link is what makes it the Python of its environment
         peer_python=command.peer_python.absolute() if command.peer_python else None,
+        scripts=Path.cwd(),
     )
 
 
