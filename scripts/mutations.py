@@ -2,6 +2,7 @@
 
     python scripts/mutations.py                 all rows of scripts/mutations.toml
     python scripts/mutations.py --only 9 15     the rows of these bugs
+    python scripts/mutations.py --saying TD3    the rows that say so
 
 A row is a patch (file, old text, new text) and the test that must fail with it. Everything happens in a
 copy of the checkout in a temporary folder, so an interruption leaves nothing behind. Each test is first run
@@ -56,6 +57,13 @@ class Settings:
 
     only: tuple[int, ...] = ()
     """Numbers of bugs; all where none is given."""
+    saying: tuple[str, ...] = ()
+    """Words of which a row's description has one; all where none is given."""
+
+    def wants(self, mutation: Mutation) -> bool:
+        """Whether the row is to be tried."""
+        said = not self.saying or any(words in mutation.what for words in self.saying)
+        return said and (not self.only or mutation.bug in self.only)
 
 
 def table() -> list[Mutation]:
@@ -100,7 +108,7 @@ def verdict(mutation: Mutation, checkout: Path) -> str:
 
 def main(settings: Settings) -> None:
     """All rows, one line each."""
-    mutations = [m for m in table() if not settings.only or m.bug in settings.only]
+    mutations = [m for m in table() if settings.wants(m)]
     with tempfile.TemporaryDirectory() as temporary:
         checkout = Path(temporary)
         copy_checkout(checkout)

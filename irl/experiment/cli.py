@@ -70,7 +70,7 @@ COMMANDS: dict[tuple[str, ...], tuple[type, Run]] = {
     ("experts", "list"): (shelved.ListExperts, shelved.list_experts),
 }
 
-REFUSED = {
+REFUSED: dict[tuple[str, ...], str] = {
     (
         "train",
         "airl-td3",

@@ -1,5 +1,7 @@
 """The update is SB3's TD3: the same weights from the same batches, noise and settings."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -17,14 +19,14 @@ from tests.learners.test_sac_update import B, O, Twisted, absorbed, batches
 LR = 1e-3
 
 
-def model(env: Twisted | None = None, **more: float) -> TD3:
+def model(env: Twisted | None = None, **more: Any) -> TD3:
     settings = {"policy_kwargs": {"net_arch": [16, 8]}, "seed": 1, "batch_size": B, "learning_rate": LR}
     sb3 = TD3("MlpPolicy", env or Twisted(), **settings, **more)  # pyright: ignore[reportArgumentType]
     sb3.set_logger(Logger(folder=None, output_formats=[]))
     return sb3
 
 
-def ours(given: list[tuple[Transitions, Tensor]], dtype: torch.dtype = torch.float32, **more: float) -> TD3:
+def ours(given: list[tuple[Transitions, Tensor]], dtype: torch.dtype = torch.float32, **more: Any) -> TD3:
     sb3 = model(**more)
     update = TD3Update(sb3, Normaliser(O), None, dtype)
     torch.manual_seed(7)
@@ -33,7 +35,7 @@ def ours(given: list[tuple[Transitions, Tensor]], dtype: torch.dtype = torch.flo
     return sb3
 
 
-def theirs(given: list[tuple[Transitions, Tensor]], **more: float) -> TD3:
+def theirs(given: list[tuple[Transitions, Tensor]], **more: Any) -> TD3:
     sb3, inputs = model(**more), TD3Update(model(), Normaliser(O), None, torch.float32).inputs
     left = iter(given)
 
