@@ -8,7 +8,7 @@ import tyro
 
 from irl.core.errors import UserError
 from irl.experiment.imitation_run import AdversarialRun
-from irl.experiment.presets import with_preset
+from irl.experiment.preset import with_preset
 
 
 def parsed(cls: type, words: list[str], program: str) -> Any:

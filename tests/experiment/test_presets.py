@@ -14,7 +14,8 @@ from irl.demos.load import load_demos
 from irl.experiment import build
 from irl.experiment.cli import COMMANDS
 from irl.experiment.configs import Imitation
-from irl.experiment.presets import PRESETS, with_preset
+from irl.experiment.preset import with_preset
+from irl.experiment.presets import PRESETS
 from tests.experiment.conftest import DATASET, QUICK, TASK
 
 
