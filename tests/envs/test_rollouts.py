@@ -8,6 +8,7 @@ from gymnasium.spaces import Box
 from irl.core.types import Episode
 from irl.envs.make import make
 from irl.envs.rollouts import random_act, record, rollout, rollouts
+from tests import pointmass
 
 NO_TORQUE = np.zeros(3, dtype=np.float32)
 
@@ -40,6 +41,11 @@ def test_an_episode_is_what_a_plain_loop_sees():
     assert episode.seed == 3
     assert episode.obs.dtype == episode.reward.dtype == np.float64
     env.close()
+
+
+def test_a_time_limit_is_recorded_as_one_and_not_as_a_termination():
+    (episode,) = pointmass.demonstrations(1)
+    assert (len(episode), episode.terminated, episode.truncated) == (pointmass.STEPS, False, True)
 
 
 def test_actions_are_clipped_to_the_bounds():
