@@ -97,7 +97,7 @@ def _axes(span: tuple[float, float], x: Any, y: Any) -> str:
 def _round_steps(least: float, most: float) -> list[float]:
     """1, 3, 10, 30, ... between the two; with nothing between, both.
 
-    >>> _round_steps(9_000, 120_000)
+    >>> _round_steps(9_000.0, 120_000.0)
     [10000.0, 30000.0, 100000.0]
     """
     found = [m * 10.0**e for e in range(2, 9) for m in (1, 3)]
