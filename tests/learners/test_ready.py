@@ -1,6 +1,7 @@
 """SB3 models that somebody made: trained on the reward they are given, as SB3 would on one of the task's."""
 
 import io
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
@@ -92,11 +93,19 @@ def test_ppo_learns_what_sb3_learns_but_for_the_scale_of_the_reward(monkeypatch:
     assert close(weights(ours), weights(theirs))
 
 
+def kept_in(seen: list[Transitions]) -> Callable[[Transitions], Transitions]:
+    def keep(batch: Transitions) -> Transitions:
+        seen.append(batch)
+        return batch
+
+    return keep
+
+
 def test_sacs_batches_are_of_the_environments_units_and_ends() -> None:
     seen: list[Transitions] = []
     learner = ready(a_sac(envs("Pendulum-v1", 1, max_episode_steps=30)), 90, absorbing=True)
     learner._per_round = 90  # pyright: ignore[reportAttributeAccessIssue]
-    learner.start(lambda batch: torch.zeros(len(batch)), seen.append)
+    learner.start(lambda batch: torch.zeros(len(batch)), kept_in(seen))
     taken = learner.collect()
     stored = {tuple(row) for row in taken.action.tolist()}
     assert max(abs(a) for (a,) in stored) > 1.0
@@ -110,7 +119,7 @@ def test_the_discriminator_sees_the_absorbing_state_and_the_networks_do_not() ->
     seen: list[Transitions] = []
     learner = ready(a_sac(envs("Cliff-v0", 1), learning_starts=150), 400, absorbing=True)
     learner._per_round = 400  # pyright: ignore[reportAttributeAccessIssue]
-    learner.start(position, seen.append)
+    learner.start(position, kept_in(seen))
     taken = learner.collect()
     assert taken.terminated.any()
     absorbing = [batch for batch in seen if batch.absorbing is not None and batch.absorbing.any()]

@@ -54,7 +54,7 @@ def theirs(given: list[tuple[Transitions, Tensor]], **more: Any) -> TD3:
 
 
 @pytest.mark.parametrize("more", [{}, {"policy_delay": 3, "target_policy_noise": 0.7}])
-def test_fifty_updates_give_the_weights_of_sb3(more: dict[str, float]) -> None:
+def test_fifty_updates_give_the_weights_of_sb3(more: dict[str, Any]) -> None:
     given = batches(50)
     mine, its = ours(given, **more).policy.state_dict(), theirs(given, **more).policy.state_dict()
     start = model().policy.state_dict()
