@@ -184,8 +184,8 @@ PRESETS: dict[str, Preset] = {
     ),
     "dac-walker2d": Preset(
         "dac",
-        "scripts/benchmarks/RESULTS.md: with a quarter of each batch from the demonstrations it learns "
-        "faster, and HalfCheetah slower",
+        "scripts/benchmarks/RESULTS.md: a quarter of demonstration steps was ahead on the one seed that "
+        "ran with and without it; on HalfCheetah it was behind",
         "nothing: it is irl's own",
         _STEADY | {"steps": 150_000, "schedule.expert_share": 0.25},
     ),
