@@ -28,12 +28,12 @@ A part is the product of its methods, tasks, demos and seeds.
 """
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from irl.core import files
 from irl.core.config import check_at_least, check_seed, from_json, to_json
 from irl.core.errors import UserError
 
@@ -155,13 +155,7 @@ def read_grid(path: Path) -> Grid:
     Raises:
         UserError: there is none, it is no TOML, or it says what there is not.
     """
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise UserError(f"no grid file {path}") from error
-    # ValueError: neither TOML nor UTF-8
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{path} is not readable TOML ({error})") from error
+    content = files.read_toml(path, "grid")
     if not isinstance(parts := content.get("part"), list):
         raise UserError(f"{path} has no [[part]]; irl/bench/grid.py shows a grid")
     shared = {key: content.pop(key) for key in INHERITED if key in content}

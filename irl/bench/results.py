@@ -10,6 +10,7 @@ from irl.core.config import to_json
 from irl.core.errors import UserError
 from irl.core.provenance import environment
 from irl.core.records import RunFolder, open_run
+from irl.policies.card import normalised_score
 
 PLACES = ("out", "datasets_root", "run", "watch", "kind", "seed", "seeds", "env_id", "env_kwargs", "demos")
 """Settings of a run that say where, or that the cell says already."""
@@ -73,7 +74,7 @@ def scored(result: dict[str, Any], references: tuple[float, float] | None) -> di
     if result.get("score") is not None or references is None:
         return result
     random, expert = references
-    score = (result["return_mean"] - random) / (expert - random)
+    score = normalised_score(result["return_mean"], random, expert)
     return {**result, "score": score, "random_return": random, "expert_return": expert}
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from irl.core.statistics import auroc, iqm
+from irl.core.statistics import auroc, iqm, iqm_rows
 
 DRAWS = 10_000
 """Resamples."""
@@ -38,7 +38,7 @@ def averages(groups: Groups, rng: np.random.Generator, draws: int = DRAWS) -> tu
     if not _resamplable(groups):
         return Estimate(iqm(together), np.nan, np.nan), Estimate(mean, np.nan, np.nan)
     drawn = _resampled(groups, rng, draws)
-    return _estimate(iqm(together), _iqm_rows(drawn)), _estimate(mean, drawn.mean(1))
+    return _estimate(iqm(together), iqm_rows(drawn)), _estimate(mean, drawn.mean(1))
 
 
 def improvement(a: Groups, b: Groups, rng: np.random.Generator, draws: int = DRAWS) -> Estimate:
@@ -89,13 +89,6 @@ def _resamplable(groups: Groups) -> bool:
 
 def _resampled(groups: Groups, rng: np.random.Generator, draws: int) -> Float[np.ndarray, "D N"]:
     return np.concatenate([g[rng.integers(len(g), size=(draws, len(g)))] for g in groups], axis=1)
-
-
-def _iqm_rows(rows: Float[np.ndarray, "D N"]) -> Float[np.ndarray, "D"]:
-    """`irl.core.statistics.iqm` of each row."""
-    n = rows.shape[1]
-    cut = n // 4
-    return np.sort(rows, axis=1)[:, cut : n - cut].mean(1)
 
 
 def _estimate(value: float, drawn: Float[np.ndarray, "D"]) -> Estimate:

@@ -9,6 +9,7 @@ import os
 import shutil
 import stat
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -66,6 +67,21 @@ def read_json(path: Path) -> Any:
     # ValueError: neither JSON nor UTF-8, a number of thousands of digits
     except (OSError, ValueError) as error:
         raise UserError(f"{path} is not readable JSON ({error})") from error
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """The content of a TOML file that a user wrote; `what` it is goes into the message.
+
+    Raises:
+        UserError: there is none, or it is neither TOML nor UTF-8.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise UserError(f"no {what} file {path}") from error
+    # ValueError: neither TOML nor UTF-8
+    except (ValueError, RecursionError) as error:
+        raise UserError(f"{path} is not readable TOML ({error})") from error
 
 
 @contextmanager

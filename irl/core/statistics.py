@@ -94,8 +94,14 @@ def iqm(values: Float[np.ndarray, "N"]) -> float:
     """
     if len(values) == 0 or not np.all(np.isfinite(values)):
         return float("nan")
-    cut = len(values) // 4
-    return float(np.sort(np.asarray(values, dtype=np.float64))[cut : len(values) - cut].mean())
+    return float(iqm_rows(np.asarray(values, dtype=np.float64)[None])[0])
+
+
+def iqm_rows(rows: Float[np.ndarray, "D N"]) -> Float[np.ndarray, "D"]:
+    """`iqm` of each row of finite numbers, N at least 1."""
+    n = rows.shape[1]
+    cut = n // 4
+    return np.sort(rows, axis=1)[:, cut : n - cut].mean(1)
 
 
 def iqm_interval(
@@ -110,6 +116,6 @@ def iqm_interval(
     if len(values) < 2 or not np.all(np.isfinite(values)):
         return float("nan"), float("nan")
     drawn = rng.integers(len(values), size=(draws, len(values)))
-    means = np.array([iqm(row) for row in np.asarray(values)[drawn]])
+    means = iqm_rows(np.asarray(values, dtype=np.float64)[drawn])
     low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
     return float(low), float(high)

@@ -11,12 +11,12 @@ A number that is not known keeps no bound: what was to be held was not measured.
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from irl.core import files
 from irl.core.errors import UserError
 from irl.diagnostics.verdicts import NAMES
 from irl.report.folder import lookup, number
@@ -57,13 +57,7 @@ def read_gate(path: Path) -> Gate:
     Raises:
         UserError: there is none, it is no TOML, or it names what there is not.
     """
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise UserError(f"no gate file {path}") from error
-    # ValueError: neither TOML nor UTF-8
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{path} is not readable TOML ({error})") from error
+    content = files.read_toml(path, "gate")
     _known(path, content, ("bounds", "verdicts"), "part")
     bounds, fired = (_table(path, content, name) for name in ("bounds", "verdicts"))
     if not bounds and not fired:
