@@ -45,7 +45,7 @@ class InterleavedConfig:
 
 
 def mixed(batch: Transitions, expert: Transitions, share: float) -> Transitions:
-    """The batch with the first `share` of its rows replaced by the expert's first, to the next whole row."""
+    """The batch with the first `share` of its rows replaced by the expert's first, to whole rows."""
     rows = round(share * len(batch))
     return concatenate([expert[:rows], batch[rows:]]) if rows else batch
 

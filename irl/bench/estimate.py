@@ -11,7 +11,7 @@ from irl.core import files
 from irl.core.errors import UserError
 
 # Measured on 2 cores of an AMD EPYC or Intel Xeon with other work beside (scripts/benchmarks/RESULTS.md);
-# of bc, gradient steps.
+# of bc, gradient steps; those of TD3 are guessed from SAC's.
 BY_METHOD = {"gail": 1900.0, "airl": 2000.0, "bc": 400.0}
 BY_METHOD |= dict.fromkeys(("dac", "gail-sac", "airl-sac"), 47.0) | dict.fromkeys(
     ("dac-td3", "gail-td3"), 60.0
