@@ -90,7 +90,7 @@ def train(command: TrainExpert) -> None:
     )
     player.run(to_go_on=f"irl experts train --resume {folder.path}")
     steps, last = list(folder.snapshots().items())[-1]
-    _shelve(run, load_policy(last / shelf.POLICY), steps, command)
+    _shelve(run, load_policy(last / shelf.POLICY), steps, folder.metrics()[-1]["wall_s"], command)
 
 
 def _resumed(command: TrainExpert) -> ExpertRun:
@@ -115,7 +115,7 @@ def _resumed(command: TrainExpert) -> ExpertRun:
 
 def _expert_run(command: TrainExpert) -> ExpertRun:
     env_id = full_name(command.env_id, command.env_kwargs)
-    algo, chosen = recipe(env_id, command.algo)
+    algo, chosen = recipe(env_id, command.algo, command.level)
     task = task_name(env_id)
     return ExpertRun(
         env_id=env_id,
@@ -143,7 +143,7 @@ def _open_or_create(run: ExpertRun) -> records.RunFolder:
     return records.create(run.out, config, environment(command_line(), run.device))
 
 
-def _shelve(run: ExpertRun, policy: Policy, steps: int, command: TrainExpert) -> None:
+def _shelve(run: ExpertRun, policy: Policy, steps: int, train_s: float, command: TrainExpert) -> None:
     console = Console()
     measured = measured_of(run.env_id, policy, EPISODES, 0)
     random = measure_random(run.env_id)
@@ -159,6 +159,7 @@ def _shelve(run: ExpertRun, policy: Policy, steps: int, command: TrainExpert) ->
         settings=to_json(run.learner),
         versions=versions(),
         command=command_line(),
+        train_s=train_s,
     )
     shelf.write(run.out / "policy", policy, card)
     console.print(shelf_table([Row(card, measured, run.out / "policy")]))

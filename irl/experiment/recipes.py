@@ -56,9 +56,16 @@ RECIPES: dict[tuple[str, str], Recipe] = {
 }
 """By task and algorithm; a row here made a shipped expert."""
 
+MEDIUM: dict[tuple[str, str], Recipe] = {}
+"""The same for the level `medium`: about a third of the expert's return."""
 
-def recipe(env_id: str, algo: str | None) -> tuple[str, Recipe]:
-    """An algorithm and its row for this task, or its default; without one, that of the shipped expert."""
+
+def recipe(env_id: str, algo: str | None, level: str = "expert") -> tuple[str, Recipe]:
+    """An algorithm and its row for this task, or its default; without one, that of the shipped policy.
+
+    A level of another name than `medium` is made as an expert is.
+    """
+    rows = MEDIUM if level == "medium" else RECIPES
     if algo is None:
-        algo = next((of for task, of in RECIPES if task == env_id), "ppo")
-    return algo, RECIPES.get((env_id, algo), DEFAULTS[algo])
+        algo = next((of for task, of in rows if task == env_id), "ppo")
+    return algo, rows.get((env_id, algo)) or RECIPES.get((env_id, algo), DEFAULTS[algo])

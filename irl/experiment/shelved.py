@@ -121,7 +121,7 @@ def shelf_table(rows: Sequence[Row], markdown: bool = False) -> Table:
     title = f"deterministic policies over {n} episodes; return mean ± std, mean length (shortest)"
     frame = box.MARKDOWN if markdown else box.SIMPLE_HEAD
     table = Table(title=None if markdown else title, title_justify="left", box=frame)
-    for column in ("task", "level", "made by", "steps", "return", "min", "length", "random", "size"):
+    for column in ("task", "level", "made by", "steps", "trained", "return", "min", "length", "random", "size"):
         table.add_column(column, no_wrap=column in ("task", "level"))
     for row in rows:
         card, m = row.card, row.measured
@@ -129,6 +129,7 @@ def shelf_table(rows: Sequence[Row], markdown: bool = False) -> Table:
             # escaped: what a card says is not markup
             *(escape(words) for words in (card.env_id, card.level, card.algorithm)),
             f"{card.steps / 1e6:.3g}M",
+            "-" if card.train_s is None else f"{card.train_s / 60:.0f} min",
             f"{m.return_mean:.1f} ± {m.return_std:.1f}",
             f"{m.return_min:.1f}",
             f"{m.length_mean:.0f} ({m.length_min})",

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -52,6 +52,11 @@ class Card:
     versions: dict[str, str]
     command: str
     weights_sha256: str = ""
+    train_s: float | None = None
+    """Seconds of training by the clock, evaluations and whatever else the machine did included; None: not
+    written down."""
+
+    ADDED: ClassVar[dict[str, Any]] = {"train_s": None}
 
 
 def summary(episodes: list[Episode]) -> Measurement:
@@ -121,8 +126,11 @@ def read_card(path: Path) -> Card:
     content = files.read_json(path)
     measured = {field.name for field in fields(Measurement)}
     others = {field.name for field in fields(Card)} - {"measured"}
-    if missing := sorted((measured | others) - set(content if isinstance(content, dict) else {})):
+    if missing := sorted(
+        (measured | others) - set(Card.ADDED) - set(content if isinstance(content, dict) else {})
+    ):
         raise UserError(f"{path} is not a policy card: it lacks {', '.join(missing)}")
+    content = Card.ADDED | content
     named = {name: content[name] for name in others}
     named["measured"] = {name: content[name] for name in measured}
     card = from_json(Card, named, str(path))

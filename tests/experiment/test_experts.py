@@ -33,6 +33,7 @@ def test_an_expert_is_trained_measured_and_shelved(irl: Command, algo: str) -> N
     assert set(card) >= FIXED
     assert (card["env_id"], card["algorithm"], card["episodes"]) == ("Cliff-v0", algo, 20)
     assert len(card["episode_seeds"]) == len(set(card["episode_seeds"])) == 20
+    assert card["train_s"] == files.read_json(next(Path("runs").glob("*/policy/card.json")))["train_s"] > 0
     found = shelf.find("Cliff-v0", root=Path("shelf"))
     assert found.card.measured.return_mean == card["return_mean"]
 
@@ -53,7 +54,7 @@ def test_all_of_the_shelf_is_measured_into_one_table(irl: Command, capsys: pytes
     listed = capsys.readouterr().out
     irl("experts", "evaluate", "--all", "--level", "expert", "--workers", 1, "--episodes", 1, "--markdown")
     measured = capsys.readouterr().out
-    names = "task level made by steps return min length random size"
+    names = "task level made by steps trained return min length random size"
     for printed in (listed, measured):
         head, _, *rows = [line for line in printed.splitlines() if line.startswith("|")]
         assert " ".join(head.replace("|", " ").split()) == names

@@ -90,6 +90,16 @@ def test_a_card_comes_back_as_it_was(tmp_path: Path) -> None:
     assert read_card(tmp_path / "card.json") == other
 
 
+def test_a_card_that_says_nothing_of_its_training_time_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "card.json"
+    write_card(replace(CARD, train_s=12.5), path)
+    assert read_card(path).train_s == 12.5
+    content = json.loads(path.read_text())
+    del content["train_s"]
+    path.write_text(json.dumps(content))
+    assert read_card(path) == CARD
+
+
 def test_the_file_is_flat_and_has_the_names_that_others_rely_on(tmp_path: Path) -> None:
     write_card(CARD, tmp_path / "card.json")
     content = json.loads((tmp_path / "card.json").read_text())
