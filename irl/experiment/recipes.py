@@ -1,5 +1,6 @@
 """How each expert was made: settings by task and algorithm, as data."""
 
+import dataclasses
 from dataclasses import dataclass
 
 from irl.core import products
@@ -46,6 +47,19 @@ _WALKER = PPOConfig(
     average=0.98,
 )
 
+# What counts is where the arm is some steps from now; at first it may not wave it about.
+_REACHER = PPOConfig(
+    n_envs=8,
+    batch_size=256,
+    n_epochs=10,
+    lr=3e-4,
+    gamma=0.9,
+    gae_lambda=0.95,
+    log_std_init=-1.0,
+    average=0.98,
+)
+_PUSHER = dataclasses.replace(_REACHER, gamma=0.98)
+
 DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_500_000, _PPO), "sac": Recipe(1_000_000, _SAC)}
 """For a task without a row of its own, by algorithm."""
 
@@ -53,6 +67,9 @@ RECIPES: dict[tuple[str, str], Recipe] = {
     ("Hopper-v5", "ppo"): Recipe(1_500_000, _PPO),
     ("HalfCheetah-v5", "sac"): Recipe(1_000_000, _CHEETAH),
     ("Walker2d-v5", "ppo"): Recipe(3_000_000, _WALKER),
+    ("InvertedPendulum-v5", "ppo"): Recipe(200_000, _PPO),
+    ("Reacher-v5", "ppo"): Recipe(1_000_000, _REACHER),
+    ("Pusher-v5", "ppo"): Recipe(1_000_000, _PUSHER),
 }
 """By task and algorithm; a row here made a shipped expert."""
 
