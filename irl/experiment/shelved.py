@@ -121,7 +121,8 @@ def shelf_table(rows: Sequence[Row], markdown: bool = False) -> Table:
     title = f"deterministic policies over {n} episodes; return mean ± std, mean length (shortest)"
     frame = box.MARKDOWN if markdown else box.SIMPLE_HEAD
     table = Table(title=None if markdown else title, title_justify="left", box=frame)
-    for column in ("task", "level", "made by", "steps", "trained", "return", "min", "length", "random", "size"):
+    columns = ("task", "level", "made by", "steps", "trained", "return", "min", "length", "random", "size")
+    for column in columns:
         table.add_column(column, no_wrap=column in ("task", "level"))
     for row in rows:
         card, m = row.card, row.measured
