@@ -60,7 +60,7 @@ _REACHER = PPOConfig(
 )
 _PUSHER = dataclasses.replace(_REACHER, gamma=0.98)
 
-# A stroke pays off long after it: at .99 it stands still at 140.
+# A stroke pays off long after it. Rounds of 256 steps an environment at 3e-4 stood still at 140.
 _SWIMMER = PPOConfig(
     n_envs=4,
     steps_per_round=4096,
@@ -82,7 +82,7 @@ _ANT = PPOConfig(
     hidden=(128, 128),
     average=0.98,
 )
-# Few of an old hand's episodes end, and it forgets how to begin one; noise in its actions keeps it in practice.
+# Without the bonus four of 20 episodes fell at once: an old hand begins few, and forgets how.
 _DOUBLE = dataclasses.replace(_PPO, ent_coef=0.01)
 
 DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_500_000, _PPO), "sac": Recipe(1_000_000, _SAC)}
