@@ -189,5 +189,22 @@ PRESETS: dict[str, Preset] = {
         "nothing: it is irl's own",
         _STEADY | {"steps": 150_000, "schedule.expert_share": 0.25},
     ),
+    "airl-walker2d": Preset(
+        "airl",
+        "scripts/benchmarks/RESULTS.md: with the penalty at 10 f is no steeper than 1, the policy no surer of its "
+        "actions than that, and its gait slower than the expert's",
+        "nothing: it is irl's own",
+        _STEADY
+        | {
+            "steps": 1_000_000,
+            "learner.gae_lambda": 0.9,
+            "learner.batch_size": 128,
+            "learner.n_epochs": 10,
+            "learner.lr": 5e-4,
+            "learner.average": 0.95,
+            "schedule.epochs": 2,
+            "discriminator.gradient_penalty": 0.1,
+        },
+    ),
 }
 """By name."""
