@@ -191,8 +191,8 @@ PRESETS: dict[str, Preset] = {
     ),
     "airl-walker2d": Preset(
         "airl",
-        "scripts/benchmarks/RESULTS.md: with the penalty at 10 f is no steeper than 1, the policy no surer of its "
-        "actions than that, and its gait slower than the expert's",
+        "scripts/benchmarks/RESULTS.md: with the penalty at 10 f is no steeper than 1, the policy no "
+        "surer of its actions than that, and its gait slower than the expert's",
         "nothing: it is irl's own",
         _STEADY
         | {
