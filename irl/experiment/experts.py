@@ -47,7 +47,7 @@ class TrainExpert:
     seed: int = 0
     """Seed of everything random."""
     level: str = "expert"
-    """Name of the level on the shelf."""
+    """Name of the level on the shelf; `medium` has recipes of its own, about a third of the way."""
     out: Path | None = None
     """Run folder; runs/<level>-<task>-<algo>-s<seed> unless given. A run that is there goes on."""
     policies_root: Path | None = None
