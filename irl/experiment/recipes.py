@@ -84,7 +84,7 @@ _ANT = PPOConfig(
 )
 # PPO's fell at once in two to four of 20 episodes: an old hand begins few of them, and forgets how. SAC's
 # memory does not.
-_DOUBLE = SACConfig(learning_starts=2000, average=0.8)
+_DOUBLE = SACConfig(learning_starts=2000, lr_schedule="linear", average=0.8)
 
 DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_500_000, _PPO), "sac": Recipe(1_000_000, _SAC)}
 """For a task without a row of its own, by algorithm."""
