@@ -107,8 +107,8 @@ RECIPES: dict[tuple[str, str], Recipe] = {
 
 MEDIUM: dict[tuple[str, str], Recipe] = {
     ("Hopper-v5", "ppo"): Recipe(350_000, _NEWEST),
-    ("HalfCheetah-v5", "ppo"): Recipe(500_000, _NEWEST),
-    ("Walker2d-v5", "ppo"): Recipe(650_000, dataclasses.replace(_WALKER, average=0.0)),
+    ("HalfCheetah-v5", "ppo"): Recipe(900_000, _NEWEST),
+    ("Walker2d-v5", "ppo"): Recipe(560_000, dataclasses.replace(_WALKER, average=0.0)),
 }
 """The same for the level `medium`: about a third of the expert's return."""
 
