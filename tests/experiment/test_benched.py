@@ -148,13 +148,15 @@ def test_a_cell_goes_on_where_it_was_and_what_it_was_not_is_refused(
 def test_a_cell_that_fails_is_reported_and_the_rest_goes_on(
     bench: Command, commands: list, capsys: pytest.CaptureFixture
 ) -> None:
-    Path("small.toml").write_text(GRID.replace(f'"{TASK}"', f'"{TASK}", "Ant-v5"').split("[[part]]\nkind")[0])
+    Path("small.toml").write_text(
+        GRID.replace(f'"{TASK}"', f'"{TASK}", "HumanoidStandup-v5"').split("[[part]]\nkind")[0]
+    )
     with pytest.raises(SystemExit) as stop:
-        bench("--only", "bc-ant-d2-s21", "bc-pointmass-d2-s21")
+        bench("--only", "bc-humanoidstandup-d2-s21", "bc-pointmass-d2-s21")
     assert stop.value.code == 1
     assert [path.stem for path in Path("results/small").glob("*.json")] == ["bc-pointmass-d2-s21"]
     said = capsys.readouterr().err
-    assert "irl: bc-ant-d2-s21: no expert policy for Ant-v5 on the shelf" in said
+    assert "irl: bc-humanoidstandup-d2-s21: no expert policy for HumanoidStandup-v5 on the shelf" in said
 
 
 @pytest.mark.parametrize(
