@@ -36,52 +36,17 @@ _CHEETAH = SACConfig(
 
 # Left alone the actions' deviation falls to .06 by 6M steps, and a gait that was never disturbed falls over
 # in a third of the episodes; the entropy bonus keeps it disturbed.
-_WALKER = PPOConfig(
-    n_envs=16,
-    steps_per_round=4096,
-    batch_size=512,
-    n_epochs=10,
-    lr=3e-4,
-    gae_lambda=0.95,
-    ent_coef=0.003,
-    average=0.98,
-)
+_WALKER = dataclasses.replace(_PPO, n_envs=16, steps_per_round=4096, batch_size=512, ent_coef=0.003)
 
 # What counts is where the arm is some steps from now; at first it may not wave it about.
-_REACHER = PPOConfig(
-    n_envs=8,
-    batch_size=256,
-    n_epochs=10,
-    lr=3e-4,
-    gamma=0.9,
-    gae_lambda=0.95,
-    log_std_init=-1.0,
-    average=0.98,
-)
+_REACHER = dataclasses.replace(_PPO, gamma=0.9, log_std_init=-1.0)
 _PUSHER = dataclasses.replace(_REACHER, gamma=0.98)
 
 # A stroke pays off long after it. Rounds of 256 steps an environment at 3e-4 stood still at 140.
-_SWIMMER = PPOConfig(
-    n_envs=4,
-    steps_per_round=4096,
-    batch_size=256,
-    n_epochs=10,
-    lr=6e-4,
-    gamma=0.9999,
-    gae_lambda=0.98,
-    log_std_init=0.0,
-    average=0.98,
+_SWIMMER = dataclasses.replace(
+    _PPO, n_envs=4, steps_per_round=4096, lr=6e-4, gamma=0.9999, gae_lambda=0.98, log_std_init=0.0
 )
-_ANT = PPOConfig(
-    n_envs=16,
-    steps_per_round=4096,
-    batch_size=512,
-    n_epochs=10,
-    lr=3e-4,
-    gae_lambda=0.95,
-    hidden=(128, 128),
-    average=0.98,
-)
+_ANT = dataclasses.replace(_PPO, n_envs=16, steps_per_round=4096, batch_size=512, hidden=(128, 128))
 # PPO's fell at once in two to four of 20 episodes: an old hand begins few of them, and forgets how. SAC's
 # memory does not.
 _DOUBLE = SACConfig(learning_starts=2000, lr_schedule="linear", average=0.8)

@@ -126,11 +126,9 @@ def read_card(path: Path) -> Card:
     content = files.read_json(path)
     measured = {field.name for field in fields(Measurement)}
     others = {field.name for field in fields(Card)} - {"measured"}
-    if missing := sorted(
-        (measured | others) - set(Card.ADDED) - set(content if isinstance(content, dict) else {})
-    ):
+    content = Card.ADDED | content if isinstance(content, dict) else {}
+    if missing := sorted((measured | others) - set(content)):
         raise UserError(f"{path} is not a policy card: it lacks {', '.join(missing)}")
-    content = Card.ADDED | content
     named = {name: content[name] for name in others}
     named["measured"] = {name: content[name] for name in measured}
     card = from_json(Card, named, str(path))
