@@ -33,6 +33,15 @@ _TD3 = {
 
 _STEADY = {"learner.lr_schedule": "constant", "learner.gamma": 0.98}
 
+_AIRL = _STEADY | {
+    "learner.gae_lambda": 0.9,
+    "learner.batch_size": 128,
+    "learner.n_epochs": 10,
+    "learner.lr": 5e-4,
+    "learner.average": 0.95,
+    "schedule.epochs": 2,
+}
+
 PRESETS: dict[str, Preset] = {
     "dac-paper": Preset(
         "dac-td3",
@@ -194,17 +203,15 @@ PRESETS: dict[str, Preset] = {
         "scripts/benchmarks/RESULTS.md: with the penalty at 10 f is no steeper than 1, the policy no "
         "surer of its actions than that, and its gait slower than the expert's",
         "nothing: it is irl's own",
-        _STEADY
-        | {
-            "steps": 1_000_000,
-            "learner.gae_lambda": 0.9,
-            "learner.batch_size": 128,
-            "learner.n_epochs": 10,
-            "learner.lr": 5e-4,
-            "learner.average": 0.95,
-            "schedule.epochs": 2,
-            "discriminator.gradient_penalty": 0.1,
-        },
+        _AIRL | {"steps": 1_000_000, "discriminator.gradient_penalty": 0.1},
+    ),
+    "airl-halfcheetah": Preset(
+        "airl",
+        "scripts/benchmarks/RESULTS.md: the expert's actions lie at the bounds, so log pi tells it from the "
+        "policy for as long as it may be large, and pays the policy for noise",
+        "nothing: it is irl's own",
+        _AIRL
+        | {"steps": 2_000_000, "discriminator.gradient_penalty": 5.0, "discriminator.log_pi_bound": 2.0},
     ),
 }
 """By name."""
