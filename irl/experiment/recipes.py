@@ -73,7 +73,7 @@ RECIPES: dict[tuple[str, str], Recipe] = {
     ("Pusher-v5", "ppo"): Recipe(1_000_000, _PUSHER),
     ("Swimmer-v5", "ppo"): Recipe(1_000_000, _SWIMMER),
     ("Ant-v5", "ppo"): Recipe(4_000_000, _ANT),
-    ("Humanoid-v5", "ppo"): Recipe(10_000_000, _HUMANOID),
+    ("Humanoid-v5", "ppo"): Recipe(3_000_000, _HUMANOID),
     ("InvertedDoublePendulum-v5", "sac"): Recipe(40_000, _DOUBLE),
 }
 """By task and algorithm; a row here made a shipped expert."""
