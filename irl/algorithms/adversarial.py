@@ -8,7 +8,7 @@ each round:  batch  <- learner.collect()
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import torch
 
@@ -37,20 +37,24 @@ class ScheduleConfig:
 class ReplayedScheduleConfig(ScheduleConfig):
     """The same with longer first rounds, and with the steps of earlier rollouts beside the newest."""
 
+    ADDED: ClassVar[dict[str, Any]] = {"memory": 0}
+
     epochs: int = 5
-    """Passes as long as a rollout in each round, over the steps of the last `negatives` rollouts."""
+    """Passes as long as a rollout in each round, over the newest rollouts and the memory."""
     warmup_rounds: int = 5
     """Rounds of `warmup_epochs` passes before the others."""
     warmup_epochs: int = 20
     """Passes in each of them."""
     negatives: int = 5
-    """Rollouts that steps are drawn from, the newest included: a reward that is told only of the newest
-    policy may forget what was wrong with the ones before it."""
+    """Rollouts that steps are drawn from, the newest included."""
+    memory: int = 0
+    """Steps of older rollouts that are drawn from as well, a uniform sample of all; 0 keeps none. A reward
+    that is told of the newest policies alone forgets what was wrong with the ones before them."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_at_least(self, 1, "negatives", "warmup_epochs")
-        check_at_least(self, 0, "warmup_rounds")
+        check_at_least(self, 0, "warmup_rounds", "memory")
 
 
 @runtime_checkable
@@ -104,15 +108,16 @@ class Adversarial:
         *,
         absorbing: bool = False,
     ) -> None:
-        """`rng` draws the discriminator's minibatches.
+        """`rng` draws the discriminator's minibatches, and what it remembers.
 
         With `absorbing` it is shown rollouts whose terminations lead into the absorbing state; `expert` then
         does too. The learner is rewarded for the steps it took.
         """
         self.learner, self.discriminator = learner, discriminator
         self.expert, self.schedule, self.rng = expert, schedule, rng
-        replayed = schedule.negatives if isinstance(schedule, ReplayedScheduleConfig) else 1
-        self._negatives = Negatives(replayed, absorbing)
+        replayed = schedule if isinstance(schedule, ReplayedScheduleConfig) else None
+        rollouts, memory = (replayed.negatives, replayed.memory) if replayed else (1, 0)
+        self._negatives = Negatives(rollouts, rng, memory=memory, absorbing=absorbing)
         self.index = 0
         learner.start(discriminator.reward)
 
@@ -166,6 +171,6 @@ class Adversarial:
         """Go on where another run of the same settings was."""
         self.learner.load_state_dict(state["learner"])
         self.discriminator.load_state_dict(state["discriminator"])
-        self._negatives.load_state_dict(state.get("negatives", []), self.expert.obs.device)
+        self._negatives.load_state_dict(state["negatives"], self.expert.obs.device)
         self.rng.set_state(state["rng"])
         self.index = state["index"]

@@ -15,7 +15,7 @@ from irl.core.errors import UserError
 from irl.core.finite import check_finite, named
 from irl.core.nets import Normaliser, fitted_normaliser
 from irl.core.rng import episode_seeds, stream, torch_stream
-from irl.core.types import Episode, Transitions, from_episodes
+from irl.core.types import Episode, RewardFn, Transitions, from_episodes
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.discriminators.dac import DAC, DACConfig
 from irl.discriminators.ensemble import Ensemble, one_or_several
@@ -37,8 +37,10 @@ from irl.learners.sac import SACConfig, SACLearner
 from irl.learners.td3 import TD3Config, TD3Learner
 from irl.policies.policy import PolicySpec
 from irl.policies.trainable import drawing, fresh_policy
+from irl.rewards.entropic import BOUND, Entropic
 from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
+from irl.rewards.shaped import ShapedSpec
 
 AnyLearner = PPOLearner | SACLearner | TD3Learner
 
@@ -162,9 +164,13 @@ def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
     Terminations lead into the absorbing state if the reward knows one: memories have it, for PPO
     the reward adds what it pays.
     """
-    scale = reward.spec.net.absorbing_scale
-    learner = _learner(config, copy.deepcopy(reward.net.normaliser), scale)
-    return Forward(learner, reward.to(config.device))
+    net = reward.spec.net
+    learner = _learner(config, copy.deepcopy(reward.net.normaliser), net.absorbing_scale)
+    paid: RewardFn = reward.to(config.device)
+    if isinstance(learner, PPOLearner) and config.entropy:
+        bound = net.log_pi_bound if isinstance(net, ShapedSpec) else BOUND
+        paid = Entropic(paid, learner.log_pi, config.entropy, bound)
+    return Forward(learner, paid)
 
 
 def _learner(

@@ -197,6 +197,7 @@ class RetrainRun:
     """Reinforcement learning on the frozen reward of a run's snapshot."""
 
     KIND: ClassVar[str] = "retrain"
+    ADDED: ClassVar[dict[str, Any]] = {"entropy": 0.0}
     run: Path
     """The run whose reward it is."""
     snapshot: int
@@ -206,6 +207,8 @@ class RetrainRun:
     seed: int
     out: Path
     learner: PPOConfig | SACConfig | TD3Config
+    entropy: float
+    """What a nat of PPO's own entropy pays beside the reward."""
     watch: Watch
     device: Literal["cpu", "cuda"]
     threads: int
@@ -213,5 +216,5 @@ class RetrainRun:
     def __post_init__(self) -> None:
         check_at_least(self, 1, "steps")
         check_threads(self.threads)
-        check_at_least(self, 0, "snapshot")
+        check_at_least(self, 0, "snapshot", "entropy")
         check_seed(self.seed)

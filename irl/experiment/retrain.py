@@ -72,6 +72,9 @@ class Retrain:
     is not the run's."""
     policies_root: Path | None = None
     """Where the shelf is, whose card gives the score; expert_data/policies unless given."""
+    entropy: float = 0.0
+    """What a nat of the fresh policy's own entropy pays beside the reward, in units of the reward. AIRL's is
+    learned for a policy that is paid for it, at 1. Of PPO; SAC has its own."""
     ppo: PPOConfig = field(default_factory=PPOConfig)
     """How PPO learns; its own defaults, whatever the run had."""
     sac: SACConfig = OFF_POLICY
@@ -90,6 +93,7 @@ class Retrain:
             raise ValueError("name the run whose reward it is, or a run to go on with by --resume")
         if self.steps is not None:
             check_at_least(self, 1, "steps")
+        check_at_least(self, 0, "entropy")
         for seed in (*self.seeds, *(() if self.seed is None else (self.seed,))):
             check_seed(seed)
         if self.seeds and (self.seed is not None or self.resume is not None):
@@ -155,6 +159,9 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
     for name, default in (("ppo", PPOConfig()), ("sac", OFF_POLICY), ("td3", OFF_POLICY_TD3)):
         if name != algo and getattr(command, name) != default:
             raise UserError(f"--{name}.* are settings of a learner that is not used; choose --algo {name}")
+    if command.entropy and algo != PPOConfig.KIND:
+        of_its_own = "; SAC's is --sac.ent-coef" if algo == SACConfig.KIND else ""
+        raise UserError(f"--entropy is of PPO, and the learner is {algo.upper()}{of_its_own}")
     seed = (its.seed + SEED_APART) % (MOST_SEED + 1) if command.seed is None else command.seed
     if seed == its.seed:
         raise UserError(f"seed {seed} is the run's own; a fresh policy has other streams: choose another")
@@ -170,6 +177,7 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
         seed=seed,
         out=command.out or Path("runs") / f"retrain-{source.name}-{step}{of}-{algo}-s{seed}",
         learner=getattr(command, algo),
+        entropy=command.entropy,
         watch=command.watch,
         device=command.device,
         threads=command.threads,
