@@ -211,7 +211,14 @@ PRESETS: dict[str, Preset] = {
         "policy for as long as it may be large, and pays the policy for noise",
         "nothing: it is irl's own",
         _AIRL
-        | {"steps": 2_000_000, "discriminator.gradient_penalty": 5.0, "discriminator.log_pi_bound": 2.0},
+        | {
+            "steps": 2_000_000,
+            "learner.target_kl": 0.04,
+            "learner.average": 0.98,
+            "schedule.memory": 200_000,
+            "discriminator.gradient_penalty": 5.0,
+            "discriminator.log_pi_bound": 2.0,
+        },
     ),
 }
 """By name."""

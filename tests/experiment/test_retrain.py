@@ -18,7 +18,7 @@ from irl.core.types import Transitions
 from irl.experiment import build, play
 from irl.experiment.cli import main
 from irl.experiment.configs import OFF_POLICY, OFF_POLICY_TD3, RetrainRun, Watch
-from irl.learners.ppo import PPOConfig
+from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig
 from irl.learners.td3 import TD3Config
 from irl.policies.policy import load_policy
@@ -82,9 +82,11 @@ def equal(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:
     return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
 
 
-def settings(learner: PPOConfig | SACConfig | TD3Config, env_id: str = TASK) -> RetrainRun:
+def settings(
+    learner: PPOConfig | SACConfig | TD3Config, env_id: str = TASK, entropy: float = 0.0
+) -> RetrainRun:
     watch = Watch(eval_every=3)
-    return RetrainRun(Path("run"), 128, env_id, 400, 3, Path("out"), learner, watch, "cpu", 2)
+    return RetrainRun(Path("run"), 128, env_id, 400, 3, Path("out"), learner, entropy, watch, "cpu", 2)
 
 
 @pytest.mark.usefixtures("runs")
@@ -245,6 +247,23 @@ def test_ppo_is_paid_what_the_absorbing_state_pays_where_the_task_ended() -> Non
     assert not added[~ended].any()
 
 
+@pytest.mark.usefixtures("runs")
+def test_ppo_is_paid_for_the_entropy_that_it_has_by_then() -> None:
+    small = PPOConfig(n_envs=2, steps_per_round=128, batch_size=64, hidden=(8,), lr=0.1)
+    algorithm = build.on_frozen(settings(small, entropy=0.5), reward := load_reward("gail"))
+    learner = algorithm.learner
+    assert isinstance(learner, PPOLearner)
+    densities = []
+    for _ in range(2):
+        batch = learner.collect()
+        densities.append(learner.log_pi(batch).clamp(-10.0, 10.0))
+        torch.testing.assert_close(algorithm.reward(batch), reward(batch) - 0.5 * densities[-1])
+        learner.improve(algorithm.reward)
+    learner.close()
+    assert densities[0].std() > 0
+    assert not torch.allclose(densities[0].mean(), densities[1].mean(), atol=1e-3)
+
+
 def test_the_settings_come_back_from_json() -> None:
     for learner in (PPOConfig(lr=1e-3), OFF_POLICY, OFF_POLICY_TD3):
         config = settings(learner)
@@ -264,6 +283,8 @@ MISTAKES = {
     "a snapshot that is not there": ("retrain gail --snapshot 5", ["5", "768", "--snapshot"]),
     "no steps": ("retrain gail --steps 0", ["steps", "0"]),
     "a negative seed": ("retrain gail --seed -1", ["seed", "-1"]),
+    "negative entropy": ("retrain gail --entropy -1", ["entropy", "-1"]),
+    "entropy beside SAC's": ("retrain gail --algo sac --entropy 1", ["--entropy", "PPO", "--sac.ent-coef"]),
     "settings of the other learner": ("retrain gail --sac.lr 0.1", ["--sac.*", "--algo sac"]),
     "a retrained run's reward": ("retrain done", ["kind", "retrain"]),
     "a folder with a run": ("retrain gail --out done", ["done", "irl retrain --resume done"]),

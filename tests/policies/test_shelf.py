@@ -206,6 +206,10 @@ LEAST = {
 EXPERTS = [card for card in shelf.cards(SHIPPED) if card.level == "expert"]
 
 
+def test_each_of_the_ten_tasks_has_an_expert() -> None:
+    assert {card.env_id for card in EXPERTS} == set(LEAST)
+
+
 @pytest.mark.parametrize("card", EXPERTS, ids=lambda card: card.env_id)
 def test_a_shipped_expert_is_good(card: Card) -> None:
     least, whole = LEAST[card.env_id]
