@@ -70,8 +70,9 @@ def test_the_memory_is_a_uniform_sample_of_all_that_left() -> None:
     times = torch.zeros(rollouts + 1)
     for seed in range(seeds):
         negatives = of(1, memory=memory, seed=seed)
-        for i in range(rollouts + 1):
-            last = negatives.with_newest(rollout(i, steps=steps))
+        for i in range(rollouts):
+            negatives.with_newest(rollout(i, steps=steps))
+        last = negatives.with_newest(rollout(rollouts, steps=steps))
         times += torch.bincount(last.obs[:memory, 0].long(), minlength=rollouts + 1)
     n, share = rollouts * steps, 1 / rollouts
     variance = seeds * memory * share * (1 - share) * (n - memory) / (n - 1)

@@ -36,14 +36,21 @@ def repeats_its_card(act: ActFn, card: Card, episodes: int = 3) -> bool:
     )
 
 
-def agrees_with_its_card(act: ActFn, card: Card, episodes: int = 3) -> bool:
-    """The same on any processor: a digest, elsewhere, sees what this cannot."""
-    again = measure(card.env_id, act, list(card.measured.episode_seeds[:episodes]))
+def agrees_with_its_card(act: ActFn, card: Card, episodes: int = 5) -> bool:
+    """Whether most of the episodes are the card's, on any processor: a digest, elsewhere, sees what this cannot.
+
+    Not all of them: HalfCheetah's medium policy lands on its back in 2 of 20 episodes where the processor rounds
+    in one way, and in none where it rounds in another.
+    """
     expected = card.measured
+    again = measure(card.env_id, act, list(expected.episode_seeds[:episodes]))
     far = max(ROUNDING * abs(expected.return_mean), DEVIATIONS * expected.return_std)
     whole = len(set(expected.lengths)) == 1
-    same_lengths = not whole or again.lengths == expected.lengths[:episodes]
-    return same_lengths and again.returns == pytest.approx(expected.returns[:episodes], abs=far)
+    pairs = zip(again.returns, expected.returns, again.lengths, expected.lengths, strict=False)
+    near = sum(
+        abs(here - there) <= far and (not whole or long == length) for here, there, long, length in pairs
+    )
+    return near > episodes / 2
 
 
 def perturbed(policy: Policy) -> Policy:
