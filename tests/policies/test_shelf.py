@@ -39,8 +39,8 @@ def repeats_its_card(act: ActFn, card: Card, episodes: int = 3) -> bool:
 def agrees_with_its_card(act: ActFn, card: Card, episodes: int = 5) -> bool:
     """Whether most episodes are the card's, on any processor: a digest, elsewhere, sees what this cannot.
 
-    Not all of them: HalfCheetah's medium policy lands on its back in 2 of 20 episodes where the processor rounds
-    in one way, and in none where it rounds in another.
+    Not all: HalfCheetah's medium policy falls on its back in 2 of 20 episodes where the processor rounds one
+    way, and in none where it rounds in another.
     """
     expected = card.measured
     again = measure(card.env_id, act, list(expected.episode_seeds[:episodes]))
