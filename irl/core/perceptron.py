@@ -39,7 +39,7 @@ class Perceptron(Tied):
         self.gradients = views(self.gradient, shapes)
         full = self.flat.detach()
         self._rounded = full if dtype == torch.float32 else full.to(dtype)
-        exact = views(full, shapes)
+        self._exact = exact = views(full, shapes)
         # where nothing is hidden, the first layer is the last
         self.weights = [*exact[:2], *views(self._rounded, shapes)[2:-2], *exact[2:][-2:]]
         """Weight and bias of each layer, as they are multiplied."""
@@ -55,6 +55,13 @@ class Perceptron(Tied):
         Differentiable once, in the weights alone.
         """
         return _Evaluate.apply(x, self.flat, self, slopes)  # pyright: ignore[reportReturnType]
+
+    @torch.no_grad()
+    def values(self, x: Float[Tensor, "B I"]) -> Float[Tensor, "B"]:
+        """Values alone, without a gradient and unrounded in every `dtype`."""
+        for weight, bias in zip(self._exact[:-2:2], self._exact[1:-2:2], strict=True):
+            x = self.phi(torch.addmm(bias, x, weight.t()))
+        return torch.addmv(self._exact[-1], x, self._exact[-2][0])
 
 
 class _Evaluate(torch.autograd.Function):

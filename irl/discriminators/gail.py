@@ -118,7 +118,8 @@ class GAIL:
     def reward(self, batch: Transitions) -> Float[Tensor, "B"]:
         """The mapped logit, without a gradient; at a termination with what the absorbing state pays."""
         with torch.no_grad():
-            return tail.reward(self.net, self.reward_map, batch, self.gamma)
+            logits = self._slopes.values(self.net.inputs(batch))
+            return tail.of_logits(self.net, self.reward_map, logits, batch, self.gamma)
 
     def update(self, expert: Transitions, policy: Transitions) -> Metrics:
         """One gradient step on a batch of each. Returns the loss before it and the last penalty taken."""

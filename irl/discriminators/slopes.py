@@ -44,6 +44,11 @@ class Slopes:
             return values[: len(x)], at_ends
         return self._net.of_inputs(x), input_gradient(self._net, sloped)
 
+    def values(self, x: Float[Tensor, "B I"]) -> Float[Tensor, "B"]:
+        """The logit of each row, without a gradient; no unit is dropped."""
+        with torch.no_grad():
+            return self._net.of_inputs(x) if self._fast is None else self._fast.values(x)
+
     def refresh(self) -> None:
         """Call it after the weights changed."""
         if self._fast is not None:

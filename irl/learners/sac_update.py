@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import torch
 from gymnasium.spaces import Box
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from stable_baselines3 import SAC
 from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
 from torch import Tensor, nn
@@ -98,7 +98,7 @@ class SACUpdate:
         next_obs = self.inputs.features(batch.next_obs, batch.next_absorbing)
         temperature = self._log_temperature.exp().squeeze()
         outputs, activations = self._actor(torch.cat([obs, next_obs]))
-        drawn, following = self._sampled(outputs[0, :size]), self._sampled(outputs[0, size:])
+        drawn, following = self._sampled(outputs[0], size)
         shares = gradients.shares(drawn.log_pi, alive)
 
         if self._learns_temperature:
@@ -153,7 +153,7 @@ class SACUpdate:
         of_inputs = self._critics.into_inputs(self._head.of_value(said, shares), through)
         of_action, of_log_pi = of_inputs[:, :, obs.shape[1] :].sum(0), temperature * shares
         of_mean, of_log_std = gradients.of_squashed(drawn.action, drawn.moved, of_action, of_log_pi)
-        of_log_std = of_log_std * _within_bounds(drawn.log_std)
+        of_log_std = of_log_std * (drawn.log_std == drawn.log_std.clamp(LOG_STD_MIN, LOG_STD_MAX))
         self._actor.differentiate(torch.cat([of_mean, of_log_std], 1).unsqueeze(0), seen)
         adam.step(self.optimizers[0])
         self._actor.refresh()
@@ -178,19 +178,21 @@ class SACUpdate:
 
     def sample(self, features: Float[Tensor, "B F"]) -> Float[Tensor, "B A"]:
         """Actions within [-1, 1] for normalised observations."""
-        return self._sampled(self._actor(features)[0][0]).action
+        mean, log_std = self.gaussian(features)
+        return torch.tanh(mean + log_std.exp() * self._noise(mean))
 
     def gaussian(self, features: Float[Tensor, "B F"]) -> tuple[Float[Tensor, "B A"], Float[Tensor, "B A"]]:
         """Mean and log deviation of the actions before the squashing."""
-        mean, log_std = self._actor(features)[0][0].chunk(2, dim=1)
+        mean, log_std = self._actor.values(features)[0].chunk(2, dim=1)
         return mean, log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
 
-    def _sampled(self, outputs: Float[Tensor, "B C"]) -> _Drawn:
+    def _sampled(self, outputs: Float[Tensor, "N C"], size: int) -> tuple[_Drawn, _Drawn]:
+        """Of both ends of a step, drawn one after the other as SB3 does."""
         mean, log_std = outputs.chunk(2, dim=1)
-        noise = torch.randn(mean.shape, generator=self.rng, device=mean.device)
+        noise = torch.cat([self._noise(mean[:size]), self._noise(mean[size:])])
         bounded = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
-        return _Drawn(*squashed(mean, bounded, noise), bounded.exp() * noise, log_std)
+        parts = (*squashed(mean, bounded, noise), bounded.exp() * noise, log_std)
+        return _Drawn(*(of[:size] for of in parts)), _Drawn(*(of[size:] for of in parts))
 
-
-def _within_bounds(log_std: Float[Tensor, "B A"]) -> Bool[Tensor, "B A"]:
-    return (log_std >= LOG_STD_MIN) & (log_std <= LOG_STD_MAX)
+    def _noise(self, like: Float[Tensor, "B A"]) -> Float[Tensor, "B A"]:
+        return torch.randn(like.shape, generator=self.rng, device=like.device)

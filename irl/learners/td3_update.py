@@ -133,4 +133,4 @@ class TD3Update:
 
     def act(self, features: Float[Tensor, "B F"]) -> Float[Tensor, "B A"]:
         """The actor's actions, within [-1, 1]."""
-        return torch.tanh(self._actor(features)[0][0])
+        return torch.tanh(self._actor.values(features)[0])

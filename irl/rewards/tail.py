@@ -25,7 +25,18 @@ def reward(net: LogitNet, reward_map: str, batch: Transitions, gamma: float) -> 
     Raises:
         ValueError: a tail is needed, and gamma is not below 1.
     """
-    of_steps = MAPS[reward_map](net(batch))
+    return of_logits(net, reward_map, net(batch), batch, gamma)
+
+
+def of_logits(
+    net: LogitNet, reward_map: str, logits: Float[Tensor, "B"], batch: Transitions, gamma: float
+) -> Float[Tensor, "B"]:
+    """The same, given what the network says of the batch.
+
+    Raises:
+        ValueError: as above.
+    """
+    of_steps = MAPS[reward_map](logits)
     if not net.spec.absorbing_scale or not bool(batch.terminated.any()):
         return of_steps
     return added(of_steps, MAPS[reward_map](net.of_absorbing()), batch, gamma)

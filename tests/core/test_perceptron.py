@@ -53,6 +53,9 @@ def test_it_is_autograd(activation: str, hidden: tuple[int, ...], slopes: int) -
     found, expected = fast(x, slopes), by_autograd(other, x, slopes)
     for one, its in zip(found, expected, strict=True):
         torch.testing.assert_close(one, its)
+    alone = fast.values(x)
+    torch.testing.assert_close(alone, expected[0].detach())
+    assert not alone.requires_grad
     loss(*found).backward()
     loss(*expected).backward()
     assert fast.flat.grad is not None
@@ -118,6 +121,7 @@ def test_bfloat16_is_within_its_rounding_and_everything_that_leaves_is_float32(a
         assert one.dtype == torch.float32
         # 8 bits are 0.4 %, a few roundings of them; a slope of relu also switches
         assert 0.0 < off(one, its) < (0.02 if activation == "tanh" else 0.1)
+    torch.testing.assert_close(fast.values(x), expected[0].detach())
     loss(*found).backward()
     loss(*expected).backward()
     assert fast.flat.grad is not None

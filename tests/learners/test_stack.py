@@ -85,6 +85,18 @@ def test_in_bfloat16_it_is_torch_within_its_rounding(n: int, outputs: tuple[int,
         assert 0.0 < (one - its).norm() < off * its.norm()
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+@pytest.mark.parametrize("outputs", HEADS)
+def test_values_alone_are_torchs_unrounded_and_follow_the_weights(
+    outputs: tuple[int, ...], dtype: torch.dtype
+) -> None:
+    nets, x = modules(2, outputs), drawn(32, 4)
+    net = stacked(nets, dtype)
+    for _ in range(2):
+        torch.testing.assert_close(net.values(x), outputs_of(nets, x))
+        net.flat.mul_(0.5)
+
+
 def test_a_gradient_replaces_the_one_before_it() -> None:
     of_y, net = drawn(2, 32, 5, seed=2), stacked(modules(2, (5,)))
     _, seen = net(drawn(32, 4))
