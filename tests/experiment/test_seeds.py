@@ -31,7 +31,9 @@ def test_each_seed_is_as_it_is_alone_and_the_summary_says_what_they_come_to(
     assert [row["seed"] for row in found["seeds"]] == [3, 0, 1]
     scores = sorted(row["score"] for row in found["seeds"])
     assert found["iqm"] == pytest.approx(np.mean(scores))
-    assert scores[0] <= found["interval_95"][0] <= found["interval_95"][1] <= scores[-1]
+    # where seeds are level, a mean of them is off by its last digit
+    low, high = found["interval_95"]
+    assert scores[0] - 1e-12 <= low <= high <= scores[-1] + 1e-12
     assert files.read_json(Path("many/s3/config.json"))["seed"] == 3
     printed = " ".join(capsys.readouterr().out.split())
     assert "interquartile mean of the normalised score" in printed
