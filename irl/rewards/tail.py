@@ -34,7 +34,7 @@ def of_logits(
     """The same, given what the network says of the batch.
 
     Raises:
-        ValueError: as above.
+        ValueError: a tail is needed, and gamma is not below 1.
     """
     of_steps = MAPS[reward_map](logits)
     if not net.spec.absorbing_scale or not bool(batch.terminated.any()):
