@@ -161,12 +161,14 @@ def forward(config: ExpertRun) -> Forward:
 def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
     """PPO, SAC or TD3 on a learned reward, with a copy of its normaliser, which stays as it is.
 
-    Terminations lead into the absorbing state if the reward knows one: memories have it, for PPO
-    the reward adds what it pays.
+    Terminations lead into the absorbing state if the reward knows one: memories have it, and PPO is paid for
+    each step above what s_abs pays a step, which no discount of PPO's turns into another task
+    (`LearnedReward.anchored`).
     """
     net = reward.spec.net
     learner = _learner(config, copy.deepcopy(reward.net.normaliser), net.absorbing_scale)
-    paid: RewardFn = reward.to(config.device)
+    there = reward.to(config.device)
+    paid: RewardFn = there.anchored if isinstance(learner, PPOLearner) else there
     if isinstance(learner, PPOLearner) and config.entropy:
         bound = net.log_pi_bound if isinstance(net, ShapedSpec) else BOUND
         paid = Entropic(paid, learner.log_pi, config.entropy, bound)
