@@ -222,7 +222,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "airl-sac-halfcheetah": Preset(
         "airl-sac",
-        "scripts/benchmarks/RESULTS.md: with log pi free of a narrow bound D tells the two by it and f learns little",
+        "scripts/benchmarks/RESULTS.md: where log pi may be large D tells the two by it and f learns little",
         "nothing: it is irl's own",
         _STEADY
         | {"steps": 200_000, "discriminator.gradient_penalty": 5.0, "discriminator.log_pi_bound": 2.0},
