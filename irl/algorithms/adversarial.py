@@ -47,9 +47,10 @@ class ReplayedScheduleConfig(ScheduleConfig):
     """Passes in each of them."""
     negatives: int = 5
     """Rollouts that steps are drawn from, the newest included."""
-    memory: int = 0
+    memory: int = 200_000
     """Steps of older rollouts that are drawn from as well, a uniform sample of all; 0 keeps none. A reward
-    that is told of the newest policies alone forgets what was wrong with the ones before them."""
+    that is told of the newest policies alone forgets what was wrong with the ones before them, and pays a
+    fresh policy for it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -183,6 +183,7 @@ PRESETS: dict[str, Preset] = {
             "schedule.epochs": 1,
             "schedule.warmup_rounds": 0,
             "schedule.negatives": 20,
+            "schedule.memory": 0,
         },
     ),
     "dac-halfcheetah": Preset(
@@ -203,7 +204,7 @@ PRESETS: dict[str, Preset] = {
         "scripts/benchmarks/RESULTS.md: with the penalty at 10 f is no steeper than 1, the policy no "
         "surer of its actions than that, and its gait slower than the expert's",
         "nothing: it is irl's own",
-        _AIRL | {"steps": 1_000_000, "discriminator.gradient_penalty": 0.1},
+        _AIRL | {"steps": 1_000_000, "schedule.memory": 0, "discriminator.gradient_penalty": 0.1},
     ),
     "airl-halfcheetah": Preset(
         "airl",
@@ -215,7 +216,6 @@ PRESETS: dict[str, Preset] = {
             "steps": 2_000_000,
             "learner.target_kl": 0.04,
             "learner.average": 0.98,
-            "schedule.memory": 200_000,
             "discriminator.gradient_penalty": 5.0,
             "discriminator.log_pi_bound": 2.0,
         },

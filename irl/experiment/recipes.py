@@ -20,6 +20,10 @@ class Recipe:
 # average over some 100k steps does not flicker so.
 _PPO = PPOConfig(n_envs=8, batch_size=256, n_epochs=10, lr=3e-4, gae_lambda=0.95, average=0.98)
 
+# Left alone, or with a bonus of .01 or .02, some seeds end with a gait that runs faster than it can stand
+# (1800 to 2700, episodes of 500 steps); with .03 none did, at the price of some speed.
+_HOPPER = dataclasses.replace(_PPO, n_envs=16, batch_size=512, ent_coef=0.03)
+
 _SAC = SACConfig(lr_schedule="linear", average=0.98)
 
 # Truncated quantile critics: SAC itself stands still between 6,000 and 7,000 from 200k steps on.
@@ -65,7 +69,7 @@ DEFAULTS: dict[str, Recipe] = {"ppo": Recipe(1_500_000, _PPO), "sac": Recipe(1_0
 """For a task without a row of its own, by algorithm."""
 
 RECIPES: dict[tuple[str, str], Recipe] = {
-    ("Hopper-v5", "ppo"): Recipe(1_500_000, _PPO),
+    ("Hopper-v5", "ppo"): Recipe(2_000_000, _HOPPER),
     ("HalfCheetah-v5", "sac"): Recipe(1_000_000, _CHEETAH),
     ("Walker2d-v5", "ppo"): Recipe(3_000_000, _WALKER),
     ("InvertedPendulum-v5", "ppo"): Recipe(200_000, _PPO),

@@ -82,7 +82,7 @@ def airl(task: str) -> AIRLRun:
         reward="f",
         terminal="mask",
     )
-    again = ReplayedScheduleConfig(rows, passes, warmup_rounds=0, negatives=1)
+    again = ReplayedScheduleConfig(rows, passes, warmup_rounds=0, negatives=1, memory=0)
     return AIRLRun(env_id=task, learner=ppo(s), discriminator=discriminator, schedule=again)
 
 

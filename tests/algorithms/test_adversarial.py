@@ -131,7 +131,7 @@ def test_the_first_rounds_are_longer_and_earlier_rollouts_are_shown_again() -> N
             return super().update(expert, policy)
 
     told = Numbered()
-    schedule = ReplayedScheduleConfig(10, epochs=4, warmup_rounds=2, warmup_epochs=6, negatives=2)
+    schedule = ReplayedScheduleConfig(10, epochs=4, warmup_rounds=2, warmup_epochs=6, negatives=2, memory=0)
     expert = from_episodes(pointmass.demonstrations(2))
     loop = Adversarial(told, told, expert, schedule, torch_stream(0, "minibatches"))
     list(loop.rounds(4 * pointmass.STEPS))
