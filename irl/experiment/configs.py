@@ -103,7 +103,8 @@ class AIRLRun(AdversarialRun):
     """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
     steps: int = 1_000_000
     """Environment steps in all."""
-    learner: PPOConfig = field(default_factory=PPOConfig)
+    # the newest weights stand still at one evaluation and run at the next
+    learner: PPOConfig = field(default_factory=lambda: PPOConfig(average=0.95))
     discriminator: AIRLConfig = field(default_factory=AIRLConfig)
     schedule: ReplayedScheduleConfig = field(default_factory=ReplayedScheduleConfig)
 

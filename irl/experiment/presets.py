@@ -171,6 +171,7 @@ PRESETS: dict[str, Preset] = {
             "learner.steps_per_round": 10_000,
             "learner.batch_size": 500,
             "learner.gae_lambda": 1.0,
+            "learner.average": 0.0,
             "learner.ent_coef": 0.1,
             "discriminator.hidden": (32, 32),
             "discriminator.potential_hidden": (32, 32),

@@ -20,6 +20,7 @@ import tyro
 
 from irl.core.provenance import command_line
 from irl.envs.tasks import task_name
+from irl.policies import shelf
 
 RESULTS = Path(__file__).parent / "results"
 EPISODES = 25
@@ -92,6 +93,7 @@ def result(settings: Settings, task: str, seed: int, run: Path) -> dict[str, Any
     config = json.loads((run / "config.json").read_text())
     environment = json.loads((run / "environment.json").read_text())
     shown = ("schedule", "learner", "discriminator", "demo_episodes", "demo_rate", "steps")
+    card = shelf.expert_card(task)
     reward = {name: found["reward"][name] for name in ("pearson", "spearman", "auroc")}
     return {
         "method": settings.method,
@@ -103,6 +105,8 @@ def result(settings: Settings, task: str, seed: int, run: Path) -> dict[str, Any
         "return_mean": found["policy"]["return_mean"],
         "return_std": found["policy"]["return_std"],
         "return_min": found["policy"].get("return_min"),
+        "random_return": card.random_return_mean if card else None,
+        "expert_return": card.measured.return_mean if card else None,
         "reward": reward,
         "curve": [[r["env_steps"], r["eval_return_mean"]] for r in rows if "eval_return_mean" in r],
         "wall_s": round(rows[-1]["wall_s"], 1),
