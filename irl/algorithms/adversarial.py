@@ -50,7 +50,7 @@ class ReplayedScheduleConfig(ScheduleConfig):
     memory: int = 200_000
     """Steps of older rollouts that are drawn from as well, a uniform sample of all; 0 keeps none. A reward
     that is told of the newest policies alone forgets what was wrong with the ones before them, and pays a
-    fresh policy for it."""
+    fresh policy for it. They are in each checkpoint, too: 170 MB on Ant."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
