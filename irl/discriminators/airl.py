@@ -15,9 +15,10 @@ log pi is asked anew at each update, of expert and policy rows alike, of the act
 the policy as it is now, and kept within +-log_pi_bound: under a policy nearly sure of itself an action of
 another one has -50. In s_abs nobody acts, and log pi is 0.
 
-Differs from the paper: gamma is the learner's own (the authors' code has 1); the penalties (the paper has
-none); g and h of 100-100 tanh on observations normalised by the demonstrations' fixed moments; terminations
-lead into s_abs, where the paper has none; the policy learns from f - log pi or f (the authors' code from g).
+Differs from the paper: gamma is the learner's own (the authors' code has 1); the penalties and the bound on
+log pi (the paper has neither); g and h of 100-100 tanh on observations normalised by the demonstrations' fixed
+moments; terminations lead into s_abs, where the paper has none; the policy learns from f - log pi or f (the
+authors' code from g).
 """
 
 from collections.abc import Callable
@@ -67,8 +68,9 @@ class AIRLConfig(SwitchesConfig):
     follows, so that with rewards below 0 ending an episode pays."""
     absorbing_scale: float = 10.0
     """Distance of the absorbing state from all others, where there is one."""
-    log_pi_bound: float = 10.0
-    """Log pi of an action is kept within this of 0."""
+    log_pi_bound: float = 2.0
+    """Log pi of an action is kept within this of 0. Where it may be large D tells the two by it instead of by
+    f, and a policy paid f - log pi is paid for noise without end."""
     gradient_penalty: float = 10.0
     """Weight of the penalty that pulls the slope of f to 1; 0 turns it off."""
     reward_penalty: float = 0.0

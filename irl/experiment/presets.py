@@ -180,6 +180,7 @@ PRESETS: dict[str, Preset] = {
             "discriminator.reward": "f",
             "discriminator.terminal": "mask",
             "discriminator.gradient_penalty": 0.0,
+            "discriminator.log_pi_bound": 10.0,
             "schedule.batch_size": 100,
             "schedule.epochs": 1,
             "schedule.warmup_rounds": 0,
@@ -205,7 +206,13 @@ PRESETS: dict[str, Preset] = {
         "scripts/benchmarks/RESULTS.md: with the penalty at 10 f is no steeper than 1, the policy no "
         "surer of its actions than that, and its gait slower than the expert's",
         "nothing: it is irl's own",
-        _AIRL | {"steps": 1_000_000, "schedule.memory": 0, "discriminator.gradient_penalty": 0.1},
+        _AIRL
+        | {
+            "steps": 1_000_000,
+            "schedule.memory": 0,
+            "discriminator.gradient_penalty": 0.1,
+            "discriminator.log_pi_bound": 10.0,
+        },
     ),
     "airl-halfcheetah": Preset(
         "airl",

@@ -81,6 +81,7 @@ def airl(task: str) -> AIRLRun:
         gradient_penalty=0.0,
         reward="f",
         terminal="mask",
+        log_pi_bound=10.0,
     )
     again = ReplayedScheduleConfig(rows, passes, warmup_rounds=0, negatives=1, memory=0)
     return AIRLRun(env_id=task, learner=ppo(s), discriminator=discriminator, schedule=again)
