@@ -16,9 +16,9 @@ the policy as it is now, and kept within +-log_pi_bound: under a policy nearly s
 another one has -50. In s_abs nobody acts, and log pi is 0.
 
 Differs from the paper: gamma is the learner's own (the authors' code has 1); the penalties and the bound on
-log pi (the paper has neither); g and h of 100-100 tanh on observations normalised by the demonstrations' fixed
-moments; terminations lead into s_abs, where the paper has none; the policy learns from f - log pi or f (the
-authors' code from g).
+log pi (the paper has neither); g and h of 100-100 tanh on observations normalised by the demonstrations'
+fixed moments; terminations lead into s_abs, where the paper has none; the policy learns from f - log pi or f
+(the authors' code from g).
 """
 
 from collections.abc import Callable

@@ -18,7 +18,8 @@ from irl.core.types import Transitions, concatenate
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.envs.absorbing import absorb
 
-SMALL = AIRLConfig(hidden=(8,), potential_hidden=(6,), lr=1e-2, terminal="mask")
+# with a bound that no log pi here comes to, as in the paper
+SMALL = AIRLConfig(hidden=(8,), potential_hidden=(6,), lr=1e-2, terminal="mask", log_pi_bound=10.0)
 GAMMA = 0.9
 
 

@@ -57,7 +57,13 @@ def test_g_is_the_reward_and_h_the_value_each_up_to_a_constant() -> None:
         N,
         2,
         AIRLConfig(
-            inputs="obs", hidden=(), potential_hidden=(), lr=0.1, terminal="mask", gradient_penalty=0.0
+            inputs="obs",
+            hidden=(),
+            potential_hidden=(),
+            lr=0.1,
+            terminal="mask",
+            gradient_penalty=0.0,
+            log_pi_bound=10.0,
         ),
         log_pi=log_pi,
         gamma=GAMMA,
