@@ -46,7 +46,7 @@ def players(env_id: str, policies: tuple[str, ...]) -> dict[str, ActFn]:
     nothing = np.zeros(space.shape or (), np.float32)
     return {
         **{name: _loaded(env_id, name) for name in policies},
-        "no action": lambda _: nothing,
+        "no action": lambda obs: nothing,
         "random": random_act(space, np.random.default_rng(0)),
     }
 
