@@ -20,8 +20,8 @@ class Recipe:
 # average over some 100k steps does not flicker so.
 _PPO = PPOConfig(n_envs=8, batch_size=256, n_epochs=10, lr=3e-4, gae_lambda=0.95, average=0.98)
 
-# Left alone, or with a bonus of .01 or .02, half of the seeds or more end with a gait that runs faster than it
-# can stand (1800 to 2700, episodes of 500 steps); with .03 one of four did.
+# Left alone, or with a bonus of .01 or .02, half of the seeds or more end with a gait that runs faster than
+# it can stand (1800 to 2700, episodes of 500 steps); with .03 one of four did.
 _HOPPER = dataclasses.replace(_PPO, n_envs=16, batch_size=512, ent_coef=0.03)
 
 _SAC = SACConfig(lr_schedule="linear", average=0.98)
