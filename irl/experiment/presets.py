@@ -224,6 +224,7 @@ PRESETS: dict[str, Preset] = {
             "steps": 2_000_000,
             "learner.target_kl": 0.04,
             "learner.average": 0.98,
+            "schedule.memory": 200_000,
             "discriminator.gradient_penalty": 5.0,
             "discriminator.log_pi_bound": 2.0,
         },
