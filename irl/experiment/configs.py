@@ -94,6 +94,11 @@ class DACTD3Run(OffPolicyRun):
     discriminator: DACConfig = field(default_factory=DACConfig)
 
 
+# With AIRL's reward the newest weights stand still at one evaluation and run at the next.
+AVERAGED = PPOConfig(average=0.95)
+"""PPO beside AIRL's discriminator."""
+
+
 @dataclass(frozen=True)
 class AIRLRun(AdversarialRun):
     """Adversarial inverse reinforcement learning with PPO: a reward that can be taken elsewhere."""
@@ -103,8 +108,7 @@ class AIRLRun(AdversarialRun):
     """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
     steps: int = 1_000_000
     """Environment steps in all."""
-    # the newest weights stand still at one evaluation and run at the next
-    learner: PPOConfig = field(default_factory=lambda: PPOConfig(average=0.95))
+    learner: PPOConfig = AVERAGED
     discriminator: AIRLConfig = field(default_factory=AIRLConfig)
     schedule: ReplayedScheduleConfig = field(default_factory=ReplayedScheduleConfig)
 
