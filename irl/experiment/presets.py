@@ -222,6 +222,8 @@ PRESETS: dict[str, Preset] = {
         _AIRL
         | {
             "steps": 2_000_000,
+            "learner.n_epochs": 20,
+            "learner.clip_range": 0.1,
             "learner.target_kl": 0.04,
             "learner.average": 0.98,
             "schedule.memory": 200_000,
