@@ -2,10 +2,10 @@
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -19,7 +19,6 @@ from irl.core.config import check_at_least, check_seed, from_json
 from irl.core.errors import UserError
 from irl.core.rng import episode_seeds
 from irl.core.types import Episode
-from irl.envs.make import make
 from irl.envs.rollouts import rollouts
 from irl.experiment.boarded import board
 from irl.experiment.cloned import evaluation_of_cloned
@@ -31,13 +30,12 @@ from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.probed import Asked, Named, probed
 from irl.experiment.progress import each_episode, progress
 from irl.experiment.references import references_of
+from irl.experiment.snapshots import every_snapshot
 from irl.policies.card import normalised_score, summary
-from irl.policies.policy import Policy, check_policy, load_policy
+from irl.policies.policy import Policy
 from irl.report.folder import lookup
 from irl.report.html import write_report
 from irl.report.tables import evaluation_table
-from irl.rewards.artefact import load_reward
-from irl.rewards.learned import LearnedReward
 
 NO_RETURN = "the task's own reward is not a finite number"
 
@@ -48,6 +46,8 @@ class Evaluate:
 
     run: tyro.conf.Positional[Path]
     """Run folder."""
+    part: Literal["g", "f", "f-log-pi"] | None = None
+    """Of AIRL's reward, judge this instead of g: writes evaluation-<part>.json, and no report."""
     episodes: int = 20
     """Episodes of the deterministic policy."""
     seed: int = 0
@@ -82,12 +82,11 @@ def evaluate(command: Evaluate) -> None:
     folder = records.open_run(command.run)
     # what is malformed is said before anything is played
     gate = None if command.gate is None else read_gate(command.gate)
-    files.check_writable(target := folder.path / "evaluation.json")
+    name = f"evaluation-{command.part}.json" if command.part else "evaluation.json"
+    files.check_writable(target := folder.path / name)
     began = time.monotonic()
     result = evaluation(folder, command)
     files.write_json(target, result)
-    board(folder.path, result["drift"])
-    report = write_report(folder.path)
     console = Console()
     console.print(evaluation_table(result))
     if cost := result["drift"].get("cost"):
@@ -95,7 +94,11 @@ def evaluate(command: Evaluate) -> None:
         if played := lookup(result, "cross_play.cost.steps"):
             asked += f", {played:,} steps played for cross-play"
         console.print(f"judged in {time.monotonic() - began:.0f} s; {asked}", highlight=False)
-    console.print(f"report: {report}", highlight=False, markup=False, soft_wrap=True)
+    said = f"written: {target}"
+    if command.part is None:
+        board(folder.path, result["drift"])
+        said = f"report: {write_report(folder.path)}"
+    console.print(said, highlight=False, markup=False, soft_wrap=True)
     if lines := broken(gate, result) if gate else []:
         for line in lines:
             print(f"irl: {command.gate}: {line}", file=sys.stderr)
@@ -115,10 +118,12 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     demos = drawn_again(config, folder, root)
     references = references_of(config.env_id, demos, command.policies_root)
     if isinstance(config, BCRun):
+        if command.part:
+            raise UserError(f"{folder.path} is of bc, which learns no reward; leave --part out")
         measure = lambda policy: _policy(_play(config.env_id, policy, command), references)  # noqa: E731
         return evaluation_of_cloned(folder, config, references, measure)
     # everything is read before anything is played
-    policies, rewards = _read(config.env_id, snapshots)
+    policies, rewards = every_snapshot(config.env_id, snapshots, command.part)
     policy = policies[max(policies)]
     episodes = _play(config.env_id, policy, command)
     expert = demos.held_out or demos.episodes
@@ -135,6 +140,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "version": 1,
         "run": folder.path.resolve().name,
         "method": config.KIND,
+        "part": command.part,
         "env_id": config.env_id,
         "env_steps": steps,
         "policy": _policy(episodes, references),
@@ -144,37 +150,11 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "terms": found.terms,
         "drift": {**drift, **found.drift},
         **found.trust,
-        "episodes": record(folder.path, config.env_id, episodes, rewards[steps], command.frames),
+        # the folder's pictures are the report's, which is of the whole reward
+        "episodes": []
+        if command.part
+        else record(folder.path, config.env_id, episodes, rewards[steps], command.frames),
     }
-
-
-def _read(env_id: str, snapshots: Mapping[int, Path]) -> tuple[dict[int, Policy], dict[int, LearnedReward]]:
-    """The policy and the reward of each snapshot.
-
-    Raises:
-        UserError: a file is missing or damaged, or of another task.
-    """
-    policies = {steps: load_policy(path / "policy.safetensors") for steps, path in snapshots.items()}
-    rewards = {steps: load_reward(path) for steps, path in snapshots.items()}
-    env = make(env_id)
-    try:
-        for steps, reward in rewards.items():
-            check_policy(policies[steps], env)
-            _check_reward(reward, env_id, policies[steps], snapshots[steps])
-    finally:
-        env.close()
-    return policies, rewards
-
-
-def _check_reward(reward: LearnedReward, env_id: str, policy: Policy, path: Path) -> None:
-    takes = reward.spec.net.obs_dim, reward.spec.net.action_dim
-    needs = policy.spec.obs_dim, policy.spec.action_dim
-    if reward.spec.env_id != env_id or takes != needs:
-        raise UserError(
-            f"the reward in {path / 'reward'} is of {reward.spec.env_id} with observations of {takes[0]} and "
-            f"actions of {takes[1]}; {env_id} has {needs[0]} and {needs[1]}: take the snapshot away, or "
-            f"choose the run it belongs to"
-        )
 
 
 def _play(env_id: str, policy: Policy, command: Evaluate) -> list[Episode]:

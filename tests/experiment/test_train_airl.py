@@ -67,6 +67,26 @@ def test_the_reward_of_a_run_is_g_unless_f_is_asked_for(learn: Train, irl: Comma
     assert {"airl/log_pi_expert", "airl/log_pi_policy", "airl/log_pi_at_bound"} <= set(rows[0])
 
 
+def test_a_part_is_judged_beside_the_whole_reward_and_leaves_its_report_alone(
+    learn: Train, train: Train, irl: Command, capfd: pytest.CaptureFixture
+) -> None:
+    run = learn("airl", "run")
+    irl("evaluate", run, *LOOK)
+    before = {file: file.read_bytes() for file in run.rglob("*") if file.is_file()}
+    irl("evaluate", run, *LOOK, "--part=f")
+    irl("evaluate", run, *LOOK, "--part=g")
+    assert before == {file: file.read_bytes() for file in before}
+    whole, f, g = (json.loads((run / f"evaluation{name}.json").read_text()) for name in ("", "-f", "-g"))
+    assert (whole["ledger"]["kind"], f["ledger"]["kind"], f["part"], g["part"]) == ("g", "f", "f", "g")
+    assert g["reward"] == whole["reward"]
+    assert f["reward"]["strata"] != whole["reward"]["strata"]
+    of_gail = train("gail")
+    with pytest.raises(SystemExit):
+        irl("evaluate", of_gail, *LOOK, "--part=f")
+    assert "only AIRL's rewards have; leave it out" in capfd.readouterr().err
+    assert not (of_gail / "evaluation-f.json").exists()
+
+
 def test_a_policy_is_retrained_on_each_part_and_goes_on_with_the_one_it_was_begun_with(
     learn: Train, irl: Command, capfd: pytest.CaptureFixture
 ) -> None:
