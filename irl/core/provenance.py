@@ -3,6 +3,7 @@
 import importlib.metadata
 import os
 import platform
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -41,9 +42,8 @@ def environment(command: str, device: str = "cpu") -> dict[str, Any]:
 
 
 def command_line() -> str:
-    """What was typed, without the path of the program."""
-    program = Path(sys.argv[0]).name
-    return " ".join([program, *sys.argv[1:]])
+    """What was typed, without the path of the program; it can be pasted into a shell."""
+    return shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
 
 
 def _processor() -> str:

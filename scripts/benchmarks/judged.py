@@ -3,9 +3,11 @@
     irl train gail --env-id Hopper-v5 --steps 245760 --seed 1 --demo-episodes 5 --out runs/gail-hopper
     irl evaluate runs/gail-hopper
     python scripts/benchmarks/judged.py runs/gail-hopper
+    python scripts/benchmarks/judged.py --table
 
-Distances to the hand-written reward, weights of its terms, drift over the snapshots, the discriminator's
-health; numbers to four digits. Writes results/rewards/<method>-<task>.json.
+Distances to the hand-written reward, weights of its terms, cross-play, drift over the snapshots, the
+discriminator's health, verdicts; numbers to four digits. Writes results/rewards/<reward>-<task>.json, where a
+reward is a method, `airl-f` (of `irl evaluate --part f`) or `airl-states` (g of states alone).
 """
 
 import json
@@ -18,6 +20,7 @@ import tyro
 from irl.envs.tasks import task_name
 
 RESULTS = Path(__file__).parent / "results" / "rewards"
+AGREEMENT = ("spearman", "kendall", "regret")
 DRIFT = ("snapshots", "n", "cycling", "speed", "to_final", "sign_flips", "outside")
 
 
@@ -25,10 +28,12 @@ DRIFT = ("snapshots", "n", "cycling", "speed", "to_final", "sign_flips", "outsid
 class Settings:
     """Whose rewards."""
 
-    runs: tyro.conf.Positional[tuple[Path, ...]]
+    runs: tyro.conf.Positional[tuple[Path, ...]] = ()
     """Run folders that `irl evaluate` has judged."""
     out: Path = RESULTS
     """Where the JSON goes."""
+    table: bool = False
+    """Print the table of all that are there."""
 
 
 def short(content: Any) -> Any:
@@ -40,21 +45,34 @@ def short(content: Any) -> Any:
     return [short(value) for value in content] if isinstance(content, list) else content
 
 
-def judged(run: Path) -> dict[str, Any]:
-    """What is published of a run."""
-    found = json.loads((run / "evaluation.json").read_text())
+def reward_name(run: Path, found: dict[str, Any]) -> str:
+    """The method, with the part or the inputs that are not its default."""
+    config = json.loads((run / "config.json").read_text())
+    states = config["discriminator"].get("inputs") == "obs"
+    return "-".join(filter(None, (found["method"], "states" if states else None, found.get("part"))))
+
+
+def judged(run: Path, file: Path) -> dict[str, Any]:
+    """What is published of one evaluation of a run."""
+    found = json.loads(file.read_text())
     environment = json.loads((run / "environment.json").read_text())
     drift = found["drift"]
     healths = [of["held_out"] or of["train"] for of in drift["health"]]
     moved = {name: drift[name] for name in DRIFT if name in drift}
     return {
         "method": found["method"],
+        "reward": reward_name(run, found),
         "task": found["env_id"],
         "env_steps": found["env_steps"],
         "return_mean": found["policy"]["return_mean"],
         "score": found["policy"]["normalised_score"],
         "distances": found["distances"],
         "terms": found["terms"],
+        "residual": {name: found["residual"].get(name) for name in ("r2", "share")},
+        "cross_play": {name: found["cross_play"]["agreement"][-1][name] for name in AGREEMENT},
+        "policies": len(found["cross_play"]["policies"]),
+        "chosen": found["chosen"].get("compared"),
+        "verdicts": {of["name"]: of["fired"] for of in found["verdicts"]},
         "drift": moved
         | {
             "to_truth": [distance["value"] for distance in drift["to_truth"]],
@@ -68,14 +86,46 @@ def judged(run: Path) -> dict[str, Any]:
     }
 
 
+def row(found: dict[str, Any]) -> str:
+    """One line of the table."""
+    terms, distance, agrees = found["terms"], found["distances"]["headline"], found["cross_play"]
+    forward = (terms.get("weights") or {}).get("forward")
+    said = f"{forward['weight']:.2f} ({forward['low']:.2f} to {forward['high']:.2f})" if forward else "–"
+    between = [f"{agrees[name]['value']:.2f}" for name in AGREEMENT]
+    fired = ", ".join(name for name, is_so in found["verdicts"].items() if is_so) or "none"
+    cells = (
+        found["reward"],
+        found["task"].removesuffix("-v5"),
+        f"{found['score']:.3f}",
+        f"{distance['value']:.2f}",
+        said,
+        f"{terms['survival_bonus']:+.2f}",
+        f"{terms['explained']:.2f}",
+        *between,
+        fired,
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def table(out: Path) -> str:
+    """A line a reward and task, of those files that have the verdicts too."""
+    head = "reward|task|score|VAL|forward (95 %)|bonus|explained|Spearman|Kendall|regret|verdicts".split("|")
+    files = [json.loads(file.read_text()) for file in sorted(out.glob("*.json"))]
+    rows = [row(found) for found in files if "verdicts" in found]
+    return "\n".join([f"| {' | '.join(head)} |", "|---" * len(head) + "|", *rows])
+
+
 def main(settings: Settings) -> None:
     """Read and write each."""
     settings.out.mkdir(parents=True, exist_ok=True)
     for run in settings.runs:
-        row = judged(run)
-        file = settings.out / f"{row['method']}-{task_name(row['task'])}.json"
-        file.write_text(json.dumps(short(row), indent=1) + "\n")
-        print(f"{file.name}: {row['return_mean']:.0f}")
+        for file in sorted(run.glob("evaluation*.json")):
+            found = judged(run, file)
+            target = settings.out / f"{found['reward']}-{task_name(found['task'])}.json"
+            target.write_text(json.dumps(short(found), indent=1) + "\n")
+            print(f"{target.name}: {found['return_mean']:.0f}")
+    if settings.table:
+        print(table(settings.out))
 
 
 if __name__ == "__main__":
