@@ -109,7 +109,8 @@ def row(found: dict[str, Any]) -> str:
 
 def table(out: Path) -> str:
     """A line a reward and task, of those files that have the verdicts too."""
-    head = "reward|task|score|VAL|forward (95 %)|bonus|explained|Spearman|Kendall|regret|verdicts".split("|")
+    known = ("reward", "task", "score", "VAL", "forward (95 %)", "bonus", "explained")
+    head = (*known, "Spearman", "Kendall", "regret", "verdicts")
     files = [json.loads(file.read_text()) for file in sorted(out.glob("*.json"))]
     rows = [row(found) for found in files if "verdicts" in found]
     return "\n".join([f"| {' | '.join(head)} |", "|---" * len(head) + "|", *rows])
