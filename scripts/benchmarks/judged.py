@@ -6,8 +6,9 @@
     python scripts/benchmarks/judged.py --table
 
 Distances to the hand-written reward, weights of its terms, cross-play, drift over the snapshots, the
-discriminator's health, verdicts; numbers to four digits. Writes results/rewards/<reward>-<task>.json, where a
-reward is a method, `airl-f` (of `irl evaluate --part f`) or `airl-states` (g of states alone).
+discriminator's health, verdicts; numbers to four digits. Writes results/rewards/<reward>-<task>-s<seed>.json,
+where a reward is a method, `airl-f` (of `irl evaluate --part f`) or `airl-states` (g of states alone). Files
+without a seed are older, and have fewer of these.
 """
 
 import json
@@ -33,7 +34,7 @@ class Settings:
     out: Path = RESULTS
     """Where the JSON goes."""
     table: bool = False
-    """Print the table of all that are there."""
+    """Print what is there: a line a reward at its end, and a line a reward over its snapshots."""
 
 
 def short(content: Any) -> Any:
@@ -45,9 +46,8 @@ def short(content: Any) -> Any:
     return [short(value) for value in content] if isinstance(content, list) else content
 
 
-def reward_name(run: Path, found: dict[str, Any]) -> str:
+def reward_name(config: dict[str, Any], found: dict[str, Any]) -> str:
     """The method, with the part or the inputs that are not its default."""
-    config = json.loads((run / "config.json").read_text())
     states = config["discriminator"].get("inputs") == "obs"
     return "-".join(filter(None, (found["method"], "states" if states else None, found.get("part"))))
 
@@ -55,13 +55,15 @@ def reward_name(run: Path, found: dict[str, Any]) -> str:
 def judged(run: Path, file: Path) -> dict[str, Any]:
     """What is published of one evaluation of a run."""
     found = json.loads(file.read_text())
+    config = json.loads((run / "config.json").read_text())
     environment = json.loads((run / "environment.json").read_text())
-    drift = found["drift"]
+    drift, agrees = found["drift"], found["cross_play"]["agreement"]
     healths = [of["held_out"] or of["train"] for of in drift["health"]]
     moved = {name: drift[name] for name in DRIFT if name in drift}
     return {
         "method": found["method"],
-        "reward": reward_name(run, found),
+        "reward": reward_name(config, found),
+        "seed": config["seed"],
         "task": found["env_id"],
         "env_steps": found["env_steps"],
         "return_mean": found["policy"]["return_mean"],
@@ -69,7 +71,8 @@ def judged(run: Path, file: Path) -> dict[str, Any]:
         "distances": found["distances"],
         "terms": found["terms"],
         "residual": {name: found["residual"].get(name) for name in ("r2", "share")},
-        "cross_play": {name: found["cross_play"]["agreement"][-1][name] for name in AGREEMENT},
+        "cross_play": {name: agrees[-1][name] for name in AGREEMENT},
+        "kendall": [of["kendall"]["value"] for of in agrees],
         "policies": len(found["cross_play"]["policies"]),
         "chosen": found["chosen"].get("compared"),
         "verdicts": {of["name"]: of["fired"] for of in found["verdicts"]},
@@ -91,29 +94,45 @@ def row(found: dict[str, Any]) -> str:
     terms, distance, agrees = found["terms"], found["distances"]["headline"], found["cross_play"]
     forward = (terms.get("weights") or {}).get("forward")
     said = f"{forward['weight']:.2f} ({forward['low']:.2f} to {forward['high']:.2f})" if forward else "–"
-    between = [f"{agrees[name]['value']:.2f}" for name in AGREEMENT]
+    between = [_two(agrees[name]["value"]) for name in AGREEMENT]
     fired = ", ".join(name for name, is_so in found["verdicts"].items() if is_so) or "none"
     cells = (
-        found["reward"],
-        found["task"].removesuffix("-v5"),
+        *_whose(found),
         f"{found['score']:.3f}",
         f"{distance['value']:.2f}",
         said,
-        f"{terms['survival_bonus']:+.2f}",
-        f"{terms['explained']:.2f}",
+        _two(terms.get("survival_bonus")),
+        _two(terms.get("explained")),
         *between,
         fired,
     )
     return f"| {' | '.join(cells)} |"
 
 
-def table(out: Path) -> str:
-    """A line a reward and task, of those files that have the verdicts too."""
-    known = ("reward", "task", "score", "VAL", "forward (95 %)", "bonus", "explained")
+def _two(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"
+
+
+def _whose(found: dict[str, Any]) -> tuple[str, str, str]:
+    return found["reward"], found["task"].removesuffix("-v5"), str(found["seed"])
+
+
+def over_run(found: dict[str, Any]) -> str:
+    """One line a number that the reward has at each snapshot after the first, at shares of the run."""
+    drift = found["drift"]
+    shares = [f"{100 * steps / drift['snapshots'][-1]:.3g} %" for steps in drift["snapshots"][1:]]
+    rows = {"at": shares, "VAL": map(_two, drift["to_truth"][1:]), "Kendall": map(_two, found["kendall"][1:])}
+    return "\n".join(f"| {' | '.join((*_whose(found), name, *values))} |" for name, values in rows.items())
+
+
+def tables(out: Path) -> str:
+    """Of all files that have the verdicts too."""
+    known = ("reward", "task", "seed", "score", "VAL", "forward (95 %)", "bonus", "explained")
     head = (*known, "Spearman", "Kendall", "regret", "verdicts")
     files = [json.loads(file.read_text()) for file in sorted(out.glob("*.json"))]
-    rows = [row(found) for found in files if "verdicts" in found]
-    return "\n".join([f"| {' | '.join(head)} |", "|---" * len(head) + "|", *rows])
+    full = [found for found in files if "verdicts" in found]
+    ends = [f"| {' | '.join(head)} |", "|---" * len(head) + "|", *map(row, full)]
+    return "\n".join([*ends, "", *map(over_run, full)])
 
 
 def main(settings: Settings) -> None:
@@ -122,11 +141,12 @@ def main(settings: Settings) -> None:
     for run in settings.runs:
         for file in sorted(run.glob("evaluation*.json")):
             found = judged(run, file)
-            target = settings.out / f"{found['reward']}-{task_name(found['task'])}.json"
+            name = f"{found['reward']}-{task_name(found['task'])}-s{found['seed']}"
+            target = settings.out / f"{name}.json"
             target.write_text(json.dumps(short(found), indent=1) + "\n")
             print(f"{target.name}: {found['return_mean']:.0f}")
     if settings.table:
-        print(table(settings.out))
+        print(tables(settings.out))
 
 
 if __name__ == "__main__":
