@@ -150,7 +150,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "terms": found.terms,
         "drift": {**drift, **found.drift},
         **found.trust,
-        # the folder's pictures are the report's, which is of the whole reward
+        # the folder's pictures are those of the report
         "episodes": []
         if command.part
         else record(folder.path, config.env_id, episodes, rewards[steps], command.frames),
