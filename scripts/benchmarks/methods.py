@@ -80,7 +80,7 @@ def cell(settings: Settings, task: str, seed: int) -> dict[str, Any]:
             "--seed",
             str(seed),
         )
-        where = ("--seed", str(seed), "--out", str(run), "--datasets-root", str(root))
+        where = ("--out", str(run), "--datasets-root", str(root))
         irl("train", settings.method, *words, *where, *shlex.split(settings.extra))
     irl("evaluate", str(run))
     return result(settings, task, seed, run)
