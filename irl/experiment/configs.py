@@ -202,11 +202,13 @@ class RetrainRun:
     """Reinforcement learning on the frozen reward of a run's snapshot."""
 
     KIND: ClassVar[str] = "retrain"
-    ADDED: ClassVar[dict[str, Any]] = {"entropy": 0.0}
+    ADDED: ClassVar[dict[str, Any]] = {"entropy": 0.0, "average": False}
     run: Path
     """The run whose reward it is."""
     snapshot: int
     """Environment steps of that run when the reward was saved."""
+    average: bool
+    """Whether it is the mean of that reward and those of the snapshots before it."""
     env_id: str
     steps: int
     seed: int

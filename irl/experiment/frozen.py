@@ -16,6 +16,7 @@ from irl.experiment.build import check_learner
 from irl.experiment.configs import RetrainRun
 from irl.experiment.snapshots import snapshot_of
 from irl.rewards.artefact import WEIGHTS, load_reward
+from irl.rewards.averaged import averaged
 from irl.rewards.learned import LearnedReward
 from irl.rewards.shaped import ENTROPIC, PARTS
 
@@ -24,12 +25,12 @@ RECORD = "reward.json"
 
 
 def frozen(config: RetrainRun, snapshot: Path, part: str | None = None) -> LearnedReward:
-    """The reward of a snapshot, or `part` of it, once it is known to be of a task that starts.
+    """The reward of a snapshot, a `part` or an average of it, once it is known to be of a task that starts.
 
     Raises:
         UserError: it is missing, damaged, or of another task; or the task cannot be started.
     """
-    reward = load_reward(place := snapshot / "reward", part)
+    place, reward = snapshot / "reward", _read(config, snapshot, part)
     env = make(config.env_id)
     try:
         takes = reward.spec.net.obs_dim, reward.spec.net.action_dim
@@ -51,9 +52,26 @@ def frozen(config: RetrainRun, snapshot: Path, part: str | None = None) -> Learn
         env.close()
 
 
+def _read(config: RetrainRun, snapshot: Path, part: str | None) -> LearnedReward:
+    if not config.average:
+        return load_reward(snapshot / "reward", part)
+    rewards = [load_reward(path / "reward", part) for path in _averaged_over(config).values()]
+    try:
+        return averaged(rewards)
+    except ValueError as error:
+        raise UserError(f"--average of {config.run}: {error}") from error
+
+
+def _averaged_over(config: RetrainRun) -> dict[int, Path]:
+    """The snapshots up to this one, without that of step 0, which nothing was learned by."""
+    there = open_run(config.run).snapshots().items()
+    return {steps: path for steps, path in there if 0 < steps <= config.snapshot}
+
+
 def recorded(config: RetrainRun, reward: LearnedReward, snapshot: Path) -> dict[str, Any]:
     """What is written down of it."""
     spec = reward.spec
+    over = {str(steps): _digest(path) for steps, path in _averaged_over(config).items()}
     return {
         "run": config.run.name,
         "env_steps": config.snapshot,
@@ -61,8 +79,13 @@ def recorded(config: RetrainRun, reward: LearnedReward, snapshot: Path) -> dict[
         "reward_map": spec.reward_map,
         "absorbing_scale": spec.net.absorbing_scale,
         "gamma": spec.gamma,
-        "weights_sha256": files.sha256(snapshot / "reward" / WEIGHTS),
+        "weights_sha256": _digest(snapshot),
+        **({"average_over": over} if config.average else {}),
     }
+
+
+def _digest(snapshot: Path) -> str:
+    return files.sha256(snapshot / "reward" / WEIGHTS)
 
 
 def frozen_again(config: RetrainRun, folder: RunFolder) -> LearnedReward:

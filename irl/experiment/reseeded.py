@@ -110,6 +110,7 @@ def _result(config: RetrainRun) -> dict[str, Any]:
     try:
         found = {"seed": int(content["seed"]), "true": {"returns": list(content["true"]["returns"])}}
         found["reward"] = {name: content["reward"][name] for name in ("env_steps", "reward_map")}
+        found["reward"]["average_over"] = dict(content["reward"].get("average_over", {}))
         return found | {name: content[name] for name in ("algorithm", "env_steps")}
     except (LookupError, TypeError, ValueError) as error:
         raise UserError(
@@ -149,12 +150,13 @@ def _still_to_do(command: Retrain, config: RetrainRun) -> Retrain | None:
 
 def _empty_row(result: Mapping[str, Any], learned: str, trained: str) -> dict[str, Any]:
     own, now = split_name(learned)[1], split_name(trained)[1]
+    over = result["reward"].get("average_over", {})
     other = [f"{name}={value}" for name, value in sorted(now.items()) if own.get(name) != value]
     inner = [f"{k}={v}" for k, v in sorted(now.get("dynamics", {}).items())]
     words = [*[word for word in other if not word.startswith("dynamics=")], *inner]
     return {
         "snapshot": result["reward"]["env_steps"],
-        "part": result["reward"]["reward_map"],
+        "part": result["reward"]["reward_map"] + (f", mean of {len(over)}" if over else ""),
         "dynamics": " ".join(words) or UNCHANGED,
         "env_id": trained,
         "algorithm": result["algorithm"],

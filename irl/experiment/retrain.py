@@ -52,6 +52,9 @@ class Retrain:
     part: Literal["g", "f", "f-log-pi"] | None = None
     """Of AIRL's reward: g, what a step is worth; f, the same shaped by h; f-log-pi, which the run's learner
     may have been paid, with the snapshot's own policy. g unless given."""
+    average: bool = False
+    """The mean of the rewards of this snapshot and of those before it, the untrained one left out: of what a
+    fresh policy does first, early ones know more than the last."""
     env_kwargs: Words = ()
     """Retrain where the task is another: what the environment is given beside what the run's was, name=value
     or a JSON object. Observations and actions must be of the same sizes."""
@@ -68,8 +71,8 @@ class Retrain:
     """Several, one after the other, each into a folder of its own, in --out where it is given. RUN's
     retrained.json then has their ratio to the policy beside the reward; what is done is not done again."""
     out: Path | None = None
-    """Run folder; runs/retrain-<run>-<step>[-<part>][-<task>]-<algo>-s<seed> unless given; the task where it
-    is not the run's."""
+    """Run folder; runs/retrain-<run>-<step>[-average][-<part>][-<task>]-<algo>-s<seed> unless given; the
+    task where it is not the run's."""
     policies_root: Path | None = None
     """Where the shelf is, whose card gives the score; expert_data/policies unless given."""
     entropy: float = 0.0
@@ -167,11 +170,12 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
         raise UserError(f"seed {seed} is the run's own; a fresh policy has other streams: choose another")
     source = command.run.resolve()
     env_id = full_name(its.env_id, (*command.env_kwargs, *_dynamics(command.dynamics)))
-    of = f"-{command.part}" if command.part else ""
+    of = ("-average" if command.average else "") + (f"-{command.part}" if command.part else "")
     of += f"-{task_name(env_id)}" if env_id != its.env_id else ""
     return RetrainRun(
         run=source,
         snapshot=step,
+        average=command.average,
         env_id=env_id,
         steps=its.steps if command.steps is None else command.steps,
         seed=seed,

@@ -10,10 +10,12 @@ import pytest
 import torch
 from torch import Tensor
 
+from irl.algorithms.probe import read_episodes
 from irl.core import files
 from irl.core.config import from_json, to_json
 from irl.core.records import open_run
 from irl.core.types import Transitions
+from irl.envs.rollouts import rollouts
 from irl.experiment import build, play
 from irl.experiment.cli import main
 from irl.experiment.configs import OFF_POLICY, OFF_POLICY_TD3, RetrainRun, Watch
@@ -21,7 +23,7 @@ from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig
 from irl.learners.td3 import TD3Config
 from irl.policies.policy import load_policy
-from irl.rewards.artefact import load_reward
+from irl.rewards.artefact import POLICY, load_reward
 from irl.rewards.maps import MAPS
 from irl.rewards.nets import LogitNet
 from tests.experiment.conftest import DATASET, QUICK, TASK
@@ -85,7 +87,7 @@ def settings(
     learner: PPOConfig | SACConfig | TD3Config, env_id: str = TASK, entropy: float = 0.0
 ) -> RetrainRun:
     watch = Watch(eval_every=3)
-    return RetrainRun(Path("run"), 128, env_id, 400, 3, Path("out"), learner, entropy, watch, "cpu", 2)
+    return RetrainRun(Path("run"), 128, False, env_id, 400, 3, Path("out"), learner, entropy, watch, "cpu", 2)
 
 
 @pytest.mark.usefixtures("runs")
@@ -151,6 +153,26 @@ def test_the_reward_is_that_of_the_snapshot_and_decides_what_is_learned(irl: Com
     # one seed: the same start, another end
     assert equal(early[0], last[0])
     assert not equal(early[-1], last[-1])
+
+
+@pytest.mark.usefixtures("runs")
+def test_an_average_is_the_mean_of_the_snapshots_so_far(irl: Command) -> None:
+    irl("retrain", "gail", "--average", "--snapshot", "256", "--seeds", "7", "--out", "mean", *PPO)
+    (folder,) = Path("mean").iterdir()
+    found = files.read_json(folder / "retrain.json")
+    over = {int(steps): digest for steps, digest in found["reward"]["average_over"].items()}
+    there = open_run(Path("gail")).snapshots()
+    assert list(over) == [steps for steps in there if 0 < steps <= 256]
+    assert len(over) > 1
+    assert all(files.sha256(there[at] / "reward/weights.safetensors") == over[at] for at in over)
+    starts = found["episode_seeds"]
+    last = list(open_run(folder).snapshots().values())[-1]
+    episodes = rollouts(TASK, load_policy(last / POLICY), starts)
+    rewards = [load_reward(there[at]) for at in over]
+    paid = [sum(float(given.sum()) for given in read_episodes(r, episodes)) / len(rewards) for r in rewards]
+    assert found["learned"]["return_mean"] * len(starts) == pytest.approx(sum(paid), rel=1e-4)
+    (row,) = files.read_json(Path("gail/retrained.json"))["rows"]
+    assert row["part"] == f"gail, mean of {len(over)}"
 
 
 @pytest.mark.usefixtures("runs")
