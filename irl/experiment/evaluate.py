@@ -37,6 +37,8 @@ from irl.report.folder import lookup
 from irl.report.html import write_report
 from irl.report.tables import evaluation_table
 
+EVALUATION = "evaluation.json"
+"""The one that the report shows."""
 NO_RETURN = "the task's own reward is not a finite number"
 
 
@@ -48,6 +50,9 @@ class Evaluate:
     """Run folder."""
     part: Literal["g", "f", "f-log-pi"] | None = None
     """Of AIRL's reward, judge this instead of g: writes evaluation-<part>.json, and no report."""
+    average: bool = False
+    """Judge, of each snapshot, the mean of its reward and of those before it, which is what `irl retrain
+    --average` learns from: writes evaluation-average.json, and no report."""
     episodes: int = 20
     """Episodes of the deterministic policy."""
     seed: int = 0
@@ -82,8 +87,8 @@ def evaluate(command: Evaluate) -> None:
     folder = records.open_run(command.run)
     # what is malformed is said before anything is played
     gate = None if command.gate is None else read_gate(command.gate)
-    name = f"evaluation-{command.part}.json" if command.part else "evaluation.json"
-    files.check_writable(target := folder.path / name)
+    name = "-".join(filter(None, ("evaluation", "average" if command.average else None, command.part)))
+    files.check_writable(target := folder.path / f"{name}.json")
     began = time.monotonic()
     result = evaluation(folder, command)
     files.write_json(target, result)
@@ -95,7 +100,7 @@ def evaluate(command: Evaluate) -> None:
             asked += f", {played:,} steps played for cross-play"
         console.print(f"judged in {time.monotonic() - began:.0f} s; {asked}", highlight=False)
     said = f"written: {target}"
-    if command.part is None:
+    if target.name == EVALUATION:
         board(folder.path, result["drift"])
         said = f"report: {write_report(folder.path)}"
     console.print(said, highlight=False, markup=False, soft_wrap=True)
@@ -118,12 +123,12 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
     demos = drawn_again(config, folder, root)
     references = references_of(config.env_id, demos, command.policies_root)
     if isinstance(config, BCRun):
-        if command.part:
-            raise UserError(f"{folder.path} is of bc, which learns no reward; leave --part out")
+        if command.part or command.average:
+            raise UserError(f"{folder.path} is of bc, which learns no reward; leave --part and --average out")
         measure = lambda policy: _policy(_play(config.env_id, policy, command), references)  # noqa: E731
         return evaluation_of_cloned(folder, config, references, measure)
     # everything is read before anything is played
-    policies, rewards = every_snapshot(config.env_id, snapshots, command.part)
+    policies, rewards = every_snapshot(config.env_id, snapshots, command.part, command.average)
     policy = policies[max(policies)]
     episodes = _play(config.env_id, policy, command)
     expert = demos.held_out or demos.episodes
@@ -141,6 +146,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         "run": folder.path.resolve().name,
         "method": config.KIND,
         "part": command.part,
+        "average": command.average,
         "env_id": config.env_id,
         "env_steps": steps,
         "policy": _policy(episodes, references),
@@ -152,7 +158,7 @@ def evaluation(folder: records.RunFolder, command: Evaluate) -> dict[str, Any]:
         **found.trust,
         # the folder's pictures are those of the report
         "episodes": []
-        if command.part
+        if command.part or command.average
         else record(folder.path, config.env_id, episodes, rewards[steps], command.frames),
     }
 

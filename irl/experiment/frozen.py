@@ -14,9 +14,8 @@ from irl.envs.make import make
 from irl.envs.names import split_name
 from irl.experiment.build import check_learner
 from irl.experiment.configs import RetrainRun
-from irl.experiment.snapshots import snapshot_of
+from irl.experiment.snapshots import mean_of_snapshots, snapshot_of, so_far
 from irl.rewards.artefact import WEIGHTS, load_reward
-from irl.rewards.averaged import averaged
 from irl.rewards.learned import LearnedReward
 from irl.rewards.shaped import ENTROPIC, PARTS
 
@@ -55,17 +54,13 @@ def frozen(config: RetrainRun, snapshot: Path, part: str | None = None) -> Learn
 def _read(config: RetrainRun, snapshot: Path, part: str | None) -> LearnedReward:
     if not config.average:
         return load_reward(snapshot / "reward", part)
-    rewards = [load_reward(path / "reward", part) for path in _averaged_over(config).values()]
-    try:
-        return averaged(rewards)
-    except ValueError as error:
-        raise UserError(f"--average of {config.run}: {error}") from error
+    rewards = {at: load_reward(path / "reward", part) for at, path in _averaged_over(config).items()}
+    return mean_of_snapshots(rewards, config.snapshot)
 
 
 def _averaged_over(config: RetrainRun) -> dict[int, Path]:
-    """The snapshots up to this one, without that of step 0, which nothing was learned by."""
-    there = open_run(config.run).snapshots().items()
-    return {steps: path for steps, path in there if 0 < steps <= config.snapshot}
+    """The snapshots that the average is of."""
+    return so_far(open_run(config.run).snapshots(), config.snapshot)
 
 
 def recorded(config: RetrainRun, reward: LearnedReward, snapshot: Path) -> dict[str, Any]:

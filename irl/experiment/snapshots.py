@@ -2,13 +2,17 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from irl.core.errors import UserError
 from irl.core.records import RunFolder
 from irl.envs.make import make
 from irl.policies.policy import Policy, check_policy, load_policy
 from irl.rewards.artefact import load_reward
+from irl.rewards.averaged import averaged
 from irl.rewards.learned import LearnedReward
+
+T = TypeVar("T")
 
 
 def snapshot_of(folder: RunFolder, step: int | None) -> tuple[int, Path]:
@@ -28,12 +32,14 @@ def snapshot_of(folder: RunFolder, step: int | None) -> tuple[int, Path]:
 
 
 def every_snapshot(
-    env_id: str, snapshots: Mapping[int, Path], part: str | None
+    env_id: str, snapshots: Mapping[int, Path], part: str | None, average: bool = False
 ) -> tuple[dict[int, Policy], dict[int, LearnedReward]]:
     """The policy and the reward, or a part of it, of each snapshot.
 
+    Args:
+        average: whether each reward is the mean of those so far, as of `mean_of_snapshots`.
     Raises:
-        UserError: a file is missing or damaged, or of another task, or there is no such part.
+        UserError: a file is missing or damaged, or of another task, or there is no such part or average.
     """
     policies = {steps: load_policy(path / "policy.safetensors") for steps, path in snapshots.items()}
     rewards = {steps: load_reward(path, part) for steps, path in snapshots.items()}
@@ -44,7 +50,26 @@ def every_snapshot(
             _check_reward(reward, env_id, policies[steps], snapshots[steps])
     finally:
         env.close()
+    if average:
+        rewards = {at: mean_of_snapshots(rewards, at) for at in rewards}
     return policies, rewards
+
+
+def mean_of_snapshots(rewards: Mapping[int, LearnedReward], last: int) -> LearnedReward:
+    """The mean of a run's rewards up to its snapshot `last`.
+
+    Raises:
+        UserError: there is no mean of these; why.
+    """
+    try:
+        return averaged(list(so_far(rewards, last).values()))
+    except ValueError as error:
+        raise UserError(f"--average: {error}") from error
+
+
+def so_far(snapshots: Mapping[int, T], last: int) -> dict[int, T]:
+    """Those up to `last`; that of step 0, which nothing was learned by, only where it is the last."""
+    return {steps: of for steps, of in snapshots.items() if 0 < steps <= last or steps == last}
 
 
 def _check_reward(reward: LearnedReward, env_id: str, policy: Policy, path: Path) -> None:

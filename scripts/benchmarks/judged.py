@@ -7,8 +7,9 @@
 
 Distances to the hand-written reward, weights of its terms, cross-play, drift over the snapshots, the
 discriminator's health, verdicts; numbers to four digits. Writes results/rewards/<reward>-<task>-s<seed>.json,
-where a reward is a method, `airl-f` (of `irl evaluate --part f`) or `airl-states` (g of states alone). Files
-without a seed are older, and have fewer of these.
+where a reward is a method, `airl-f` (of `irl evaluate --part f`), `airl-states` (g of states alone), or one
+of these with `-average` (of `irl evaluate --average`). Files without a seed are older, and have fewer of
+these.
 """
 
 import json
@@ -49,7 +50,8 @@ def short(content: Any) -> Any:
 def reward_name(config: dict[str, Any], found: dict[str, Any]) -> str:
     """The method, with the part or the inputs that are not its default."""
     states = config["discriminator"].get("inputs") == "obs"
-    return "-".join(filter(None, (found["method"], "states" if states else None, found.get("part"))))
+    average = "average" if found.get("average") else None
+    return "-".join(filter(None, (found["method"], "states" if states else None, found.get("part"), average)))
 
 
 def judged(run: Path, file: Path) -> dict[str, Any]:

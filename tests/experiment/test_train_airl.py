@@ -11,10 +11,12 @@ import torch
 import irl as package
 from irl.algorithms.adversarial import Adversarial
 from irl.core import files
+from irl.core.records import open_run
 from irl.core.types import from_episodes
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.experiment import build
 from irl.experiment.configs import AIRLRun, AIRLSACRun
+from irl.experiment.snapshots import every_snapshot
 from irl.learners.ppo import PPOConfig, PPOLearner
 from tests import pointmass
 from tests.experiment.conftest import LOOK, QUICK, TASK
@@ -85,6 +87,33 @@ def test_a_part_is_judged_beside_the_whole_reward_and_leaves_its_report_alone(
         irl("evaluate", of_gail, *LOOK, "--part=f")
     assert "only AIRL's rewards have; leave it out" in capfd.readouterr().err
     assert not (of_gail / "evaluation-f.json").exists()
+
+
+def test_the_average_of_the_snapshots_so_far_is_judged(
+    learn: Train, irl: Command, capfd: pytest.CaptureFixture
+) -> None:
+    run = learn("airl", "run")
+    steps = from_episodes(pointmass.demonstrations(1))
+    there = open_run(run).snapshots()
+    rewards = {at: package.load_reward(path) for at, path in there.items()}
+    _, means = every_snapshot(TASK, there, None, average=True)
+    first, second = list(rewards)[1:3]
+    torch.testing.assert_close(means[0](steps), rewards[0](steps))
+    torch.testing.assert_close(means[first](steps), rewards[first](steps))
+    torch.testing.assert_close(means[second](steps), (rewards[first](steps) + rewards[second](steps)) / 2)
+    irl("evaluate", run, *LOOK)
+    before = {file: file.read_bytes() for file in run.rglob("*") if file.is_file()}
+    irl("evaluate", run, *LOOK, "--average", "--part=f")
+    irl("evaluate", run, *LOOK, "--average")
+    assert before == {file: file.read_bytes() for file in before}
+    names = ("evaluation", "evaluation-average", "evaluation-average-f")
+    last, mean, mean_of_f = (json.loads((run / f"{name}.json").read_text()) for name in names)
+    assert (last["average"], mean["average"], mean_of_f["part"]) == (False, True, "f")
+    assert mean["drift"]["to_truth"][:2] == last["drift"]["to_truth"][:2]
+    assert mean["reward"]["strata"] != last["reward"]["strata"] != mean_of_f["reward"]["strata"]
+    with pytest.raises(SystemExit):
+        irl("evaluate", run, *LOOK, "--average", "--part=f-log-pi")
+    assert "not averaged; choose g or f" in capfd.readouterr().err
 
 
 def test_a_policy_is_retrained_on_each_part_and_goes_on_with_the_one_it_was_begun_with(
