@@ -59,6 +59,7 @@ class PPOConfig:
         "activation": "tanh",
         "reward_scaling": "std",
         "reward_clip": 0.0,
+        "ent_schedule": "constant",
     }
     n_envs: int = 16
     """Environments stepped side by side."""
@@ -84,6 +85,9 @@ class PPOConfig:
     """Advantages of a minibatch at mean 0 and deviation 1."""
     ent_coef: float = 0.0
     """Weight of the entropy bonus."""
+    ent_schedule: Literal["constant", "linear"] = "constant"
+    """`constant`, or `linear` from `ent_coef` to 0 over the run: a bonus that stays may make actions so wide
+    that their mean, which the exported policy takes where it is deterministic, is hardly tried."""
     vf_coef: float = 0.5
     """Weight of the value's loss."""
     max_grad_norm: float = 0.5
@@ -206,6 +210,7 @@ class PPOLearner(Rollouts):
         model._update_current_progress_remaining(self.env_steps, self.total_steps)
         remaining = model._current_progress_remaining
         c = self.config
+        model.ent_coef = c.ent_coef * (remaining if c.ent_schedule == "linear" else 1.0)
         metrics = self._update(model.lr_schedule(remaining), c.clip_range, c.clip_range_vf)
         check_finite(named("policy", model.policy.state_dict()))
         return metrics

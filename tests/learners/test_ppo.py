@@ -145,6 +145,20 @@ def test_a_last_round_past_the_end_learns_at_rate_zero() -> None:
     assert all(torch.equal(before[name], after) for name, after in weights(ours).items())
 
 
+def test_a_linear_bonus_is_what_is_left_of_it() -> None:
+    def after_a_round(**more: Any) -> dict[str, Tensor]:
+        ours = learner(config=replace(SMALL, **more), total_steps=512)
+        ours.collect()
+        ours.improve(position)
+        return weights(ours)
+
+    a_quarter_gone = after_a_round(ent_coef=0.4, ent_schedule="linear")
+    same = after_a_round(ent_coef=0.4 * 0.75)
+    assert all(torch.equal(a_quarter_gone[name], same[name]) for name in same)
+    whole = after_a_round(ent_coef=0.4)
+    assert not torch.equal(a_quarter_gone["log_std"], whole["log_std"])
+
+
 def test_improving_twice_on_one_rollout_is_refused() -> None:
     ours = learner()
     ours.collect()
@@ -154,7 +168,7 @@ def test_improving_twice_on_one_rollout_is_refused() -> None:
 
 
 def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(tmp_path: Any) -> None:
-    config = replace(SMALL, lr_schedule="linear", average=0.5)
+    config = replace(SMALL, lr_schedule="linear", average=0.5, ent_coef=0.1, ent_schedule="linear")
     straight = learner("Cliff-v0", config, normaliser=None)
     for round_ in range(6):
         straight.collect()
