@@ -15,9 +15,11 @@ from irl.core.records import open_run
 from irl.core.types import ActFn, from_episodes
 from irl.envs.make import make
 from irl.envs.rollouts import random_act, rollouts
+from irl.experiment.snapshots import so_far
 from irl.policies import shelf
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
+from irl.rewards.averaged import averaged
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class Settings:
     """Which snapshots: shares of the run's steps."""
     part: str | None = None
     """Of AIRL's reward; g unless given."""
+    average: bool = False
+    """The mean of the rewards so far in place of each snapshot's own."""
     episodes: int = 3
     """Of each policy."""
     seed: int = 900
@@ -63,7 +67,8 @@ def main(settings: Settings) -> None:
     played = {name: rollouts(env_id, act, seeds) for name, act in players(env_id, settings.policies).items()}
     for share in settings.shares:
         step = min(snapshots, key=lambda at: abs(at - share * max(snapshots)))
-        reward = load_reward(snapshots[step] / "reward", settings.part)
+        used = so_far(snapshots, step) if settings.average else {step: snapshots[step]}
+        reward = averaged([load_reward(path / "reward", settings.part) for path in used.values()])
         for name, episodes in played.items():
             paid = reward.anchored(from_episodes(list(episodes)))
             length = np.mean([len(episode) for episode in episodes])
