@@ -31,6 +31,7 @@ from irl.core.errors import UserError
 from irl.core.nets import Normaliser
 from irl.policies.density import Density
 from irl.policies.policy import load_policy
+from irl.rewards.averaged import averaged
 from irl.rewards.ensemble import EnsembleNet, EnsembleSpec
 from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.maps import MAPS
@@ -61,17 +62,20 @@ def save_reward(folder: Path, spec: RewardSpec, net: LogitNet | ShapedNet | Ense
     files.write_json(folder / SPEC, content)
 
 
-def load_reward(path: Path | str, part: str | None = None) -> LearnedReward:
+def load_reward(path: Path | str, part: str | None = None, *, average: bool = False) -> LearnedReward:
     """The reward in a folder: a reward's own, a snapshot's, or a run's (its last snapshot).
 
     Args:
         part: of AIRL's g and f, which one, or f-log-pi of a snapshot; g unless given. Other rewards have
             no parts.
+        average: whether to give the mean of the rewards of all snapshots of a run, that of step 0 left out.
 
     Raises:
         UserError: there is none, it is of a newer format, its weights do not fit its specification, or it
-            has no such part.
+            has no such part or average.
     """
+    if average:
+        return _average(Path(path), part)
     folder = _reward_folder(Path(path))
     content = files.read_json(folder / SPEC)
     try:
@@ -88,6 +92,17 @@ def load_reward(path: Path | str, part: str | None = None) -> LearnedReward:
         has = f"choose one of {', '.join(known)}" if known else "only AIRL's rewards have; leave it out"
         raise UserError(f"the reward of {spec.method} in {folder} has no part {part!r:.40}; {has}")
     return LearnedReward(replace(spec, reward_map=part), net, _density(folder) if part == ENTROPIC else None)
+
+
+def _average(run: Path, part: str | None) -> LearnedReward:
+    folders = sorted(run.glob("snapshots/*/reward"))
+    learned = [folder for folder in folders if folder.parent.name.strip("0")]
+    if not learned:
+        raise UserError(f"no rewards to average in {run}: expected a run with {run / 'snapshots'}")
+    try:
+        return averaged([load_reward(folder, part) for folder in learned])
+    except ValueError as error:
+        raise UserError(f"no average of the rewards of {run}: {error}") from error
 
 
 def _density(folder: Path) -> Density:

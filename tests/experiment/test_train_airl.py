@@ -101,6 +101,10 @@ def test_the_average_of_the_snapshots_so_far_is_judged(
     torch.testing.assert_close(means[0](steps), rewards[0](steps))
     torch.testing.assert_close(means[first](steps), rewards[first](steps))
     torch.testing.assert_close(means[second](steps), (rewards[first](steps) + rewards[second](steps)) / 2)
+    of_the_run = package.load_reward(run, average=True)
+    torch.testing.assert_close(of_the_run(steps), means[max(rewards)](steps))
+    with pytest.raises(package.UserError, match="no rewards to average in"):
+        package.load_reward(run / "snapshots", average=True)
     irl("evaluate", run, *LOOK)
     before = {file: file.read_bytes() for file in run.rglob("*") if file.is_file()}
     irl("evaluate", run, *LOOK, "--average", "--part=f")
