@@ -52,7 +52,8 @@ class Evaluate:
     """Of AIRL's reward, judge this instead of g: writes evaluation-<part>.json, and no report."""
     average: bool = False
     """Judge, of each snapshot, the mean of its reward and of those before it, which is what `irl retrain
-    --average` learns from: writes evaluation-average.json, and no report."""
+    --average` learns from: writes evaluation-average.json, and no report. Its health is of a mean, which was
+    never a discriminator of anything."""
     episodes: int = 20
     """Episodes of the deterministic policy."""
     seed: int = 0

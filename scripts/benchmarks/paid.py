@@ -67,8 +67,10 @@ def main(settings: Settings) -> None:
     played = {name: rollouts(env_id, act, seeds) for name, act in players(env_id, settings.policies).items()}
     for share in settings.shares:
         step = min(snapshots, key=lambda at: abs(at - share * max(snapshots)))
-        used = so_far(snapshots, step) if settings.average else {step: snapshots[step]}
-        reward = averaged([load_reward(path / "reward", settings.part) for path in used.values()])
+        reward = load_reward(snapshots[step] / "reward", settings.part)
+        if settings.average:
+            used = so_far(snapshots, step).values()
+            reward = averaged([load_reward(path / "reward", settings.part) for path in used])
         for name, episodes in played.items():
             paid = reward.anchored(from_episodes(list(episodes)))
             length = np.mean([len(episode) for episode in episodes])

@@ -105,7 +105,9 @@ def _averages(settings: Settings) -> bool:
 
 
 def _reward(settings: Settings, config: dict[str, Any]) -> str:
-    return reward_name(config, {"method": config["kind"], "average": _averages(settings)})
+    words = shlex.split(settings.extra)
+    part = words[words.index("--part") + 1] if "--part" in words else None
+    return reward_name(config, {"method": config["kind"], "part": part, "average": _averages(settings)})
 
 
 def table(out: Path) -> str:
