@@ -20,10 +20,11 @@ another ant, and how short its legs are is not known here.
 """
 
 import inspect
+import json
 import os
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ from gymnasium.envs.mujoco import mujoco_env
 from gymnasium.envs.registration import load_env_creator
 
 from irl.core.errors import UserError
+from irl.envs.names import full_name, split_name
 
 DYNAMICS = "dynamics"
 """The argument in a task's name."""
@@ -45,6 +47,11 @@ SHORT = 0.5
 ANT = "Ant-v5"
 _MOST = 1000.0
 _HINT = f"expected factors of {', '.join(FACTORS)} above 0, or {LEGS} of 1 to 3 of {ANT}, e.g. mass=1.5"
+
+
+def named(words: Sequence[str]) -> tuple[str, ...]:
+    """What changes typed as `mass=1.5` add to a task's name, as words for `irl.envs.names.full_name`."""
+    return (json.dumps({DYNAMICS: split_name(full_name("", words))[1]}),) if words else ()
 
 
 @contextmanager

@@ -14,8 +14,9 @@ from irl.envs.make import make
 from irl.envs.names import split_name
 from irl.experiment.build import check_learner
 from irl.experiment.configs import RetrainRun
-from irl.experiment.snapshots import mean_of_snapshots, snapshot_of, so_far
+from irl.experiment.snapshots import snapshot_of
 from irl.rewards.artefact import WEIGHTS, load_reward
+from irl.rewards.averaged import averaged, so_far
 from irl.rewards.learned import LearnedReward
 from irl.rewards.shaped import ENTROPIC, PARTS
 
@@ -54,8 +55,7 @@ def frozen(config: RetrainRun, snapshot: Path, part: str | None = None) -> Learn
 def _read(config: RetrainRun, snapshot: Path, part: str | None) -> LearnedReward:
     if not config.average:
         return load_reward(snapshot / "reward", part)
-    rewards = {at: load_reward(path / "reward", part) for at, path in _averaged_over(config).items()}
-    return mean_of_snapshots(rewards, config.snapshot)
+    return averaged([load_reward(path / "reward", part) for path in _averaged_over(config).values()])
 
 
 def _averaged_over(config: RetrainRun) -> dict[int, Path]:
@@ -66,7 +66,8 @@ def _averaged_over(config: RetrainRun) -> dict[int, Path]:
 def recorded(config: RetrainRun, reward: LearnedReward, snapshot: Path) -> dict[str, Any]:
     """What is written down of it."""
     spec = reward.spec
-    over = {str(steps): _digest(path) for steps, path in _averaged_over(config).items()}
+    over = _averaged_over(config) if config.average else {}
+    digests = {str(steps): _digest(path) for steps, path in over.items()}
     return {
         "run": config.run.name,
         "env_steps": config.snapshot,
@@ -75,7 +76,7 @@ def recorded(config: RetrainRun, reward: LearnedReward, snapshot: Path) -> dict[
         "absorbing_scale": spec.net.absorbing_scale,
         "gamma": spec.gamma,
         "weights_sha256": _digest(snapshot),
-        **({"average_over": over} if config.average else {}),
+        **({"average_over": digests} if config.average else {}),
     }
 
 

@@ -6,7 +6,6 @@ from random weights, on the reward as it stands. The learner sees the learned re
 normalised as the reward normalises them, by a copy that does not move.
 """
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -18,9 +17,9 @@ from irl.core import records
 from irl.core.config import MOST_SEED, check_at_least, check_seed, check_threads, from_json, to_json
 from irl.core.errors import UserError
 from irl.core.provenance import command_line, environment
-from irl.envs.dynamics import DYNAMICS
+from irl.envs.dynamics import named
 from irl.envs.make import check_module
-from irl.envs.names import full_name, split_name
+from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
 from irl.experiment.configs import OFF_POLICY, OFF_POLICY_TD3, BCRun, Imitation, RetrainRun
@@ -169,7 +168,7 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
     if seed == its.seed:
         raise UserError(f"seed {seed} is the run's own; a fresh policy has other streams: choose another")
     source = command.run.resolve()
-    env_id = full_name(its.env_id, (*command.env_kwargs, *_dynamics(command.dynamics)))
+    env_id = full_name(its.env_id, (*command.env_kwargs, *named(command.dynamics)))
     of = ("-average" if command.average else "") + (f"-{command.part}" if command.part else "")
     of += f"-{task_name(env_id)}" if env_id != its.env_id else ""
     return RetrainRun(
@@ -186,11 +185,6 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
         device=command.device,
         threads=command.threads,
     )
-
-
-def _dynamics(words: Words) -> tuple[str, ...]:
-    """What `--dynamics` adds to the task's name."""
-    return (json.dumps({DYNAMICS: split_name(full_name("", words))[1]}),) if words else ()
 
 
 def _resumed(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:

@@ -2,17 +2,14 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TypeVar
 
 from irl.core.errors import UserError
 from irl.core.records import RunFolder
 from irl.envs.make import make
 from irl.policies.policy import Policy, check_policy, load_policy
 from irl.rewards.artefact import load_reward
-from irl.rewards.averaged import averaged
+from irl.rewards.averaged import averaged, so_far
 from irl.rewards.learned import LearnedReward
-
-T = TypeVar("T")
 
 
 def snapshot_of(folder: RunFolder, step: int | None) -> tuple[int, Path]:
@@ -37,7 +34,7 @@ def every_snapshot(
     """The policy and the reward, or a part of it, of each snapshot.
 
     Args:
-        average: whether each reward is the mean of those so far, as of `mean_of_snapshots`.
+        average: whether each reward is the mean of those so far, as of `irl.rewards.averaged`.
     Raises:
         UserError: a file is missing or damaged, or of another task, or there is no such part or average.
     """
@@ -51,25 +48,8 @@ def every_snapshot(
     finally:
         env.close()
     if average:
-        rewards = {at: mean_of_snapshots(rewards, at) for at in rewards}
+        rewards = {at: averaged(list(so_far(rewards, at).values())) for at in rewards}
     return policies, rewards
-
-
-def mean_of_snapshots(rewards: Mapping[int, LearnedReward], last: int) -> LearnedReward:
-    """The mean of a run's rewards up to its snapshot `last`.
-
-    Raises:
-        UserError: there is no mean of these; why.
-    """
-    try:
-        return averaged(list(so_far(rewards, last).values()))
-    except ValueError as error:
-        raise UserError(f"--average: {error}") from error
-
-
-def so_far(snapshots: Mapping[int, T], last: int) -> dict[int, T]:
-    """Those up to `last`; that of step 0, which nothing was learned by, only where it is the last."""
-    return {steps: of for steps, of in snapshots.items() if 0 < steps <= last or steps == last}
 
 
 def _check_reward(reward: LearnedReward, env_id: str, policy: Policy, path: Path) -> None:

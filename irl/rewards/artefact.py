@@ -31,7 +31,7 @@ from irl.core.errors import UserError
 from irl.core.nets import Normaliser
 from irl.policies.density import Density
 from irl.policies.policy import load_policy
-from irl.rewards.averaged import averaged
+from irl.rewards.averaged import averaged, so_far
 from irl.rewards.ensemble import EnsembleNet, EnsembleSpec
 from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.maps import MAPS
@@ -95,14 +95,11 @@ def load_reward(path: Path | str, part: str | None = None, *, average: bool = Fa
 
 
 def _average(run: Path, part: str | None) -> LearnedReward:
-    folders = sorted(run.glob("snapshots/*/reward"))
-    learned = [folder for folder in folders if folder.parent.name.strip("0")]
-    if not learned:
+    folders = {int(f.parent.name): f for f in run.glob("snapshots/*/reward") if f.parent.name.isdigit()}
+    if not folders:
         raise UserError(f"no rewards to average in {run}: expected a run with {run / 'snapshots'}")
-    try:
-        return averaged([load_reward(folder, part) for folder in learned])
-    except ValueError as error:
-        raise UserError(f"no average of the rewards of {run}: {error}") from error
+    used = so_far(dict(sorted(folders.items())), max(folders))
+    return averaged([load_reward(folder, part) for folder in used.values()])
 
 
 def _density(folder: Path) -> Density:

@@ -15,11 +15,10 @@ from irl.core.records import open_run
 from irl.core.types import ActFn, from_episodes
 from irl.envs.make import make
 from irl.envs.rollouts import random_act, rollouts
-from irl.experiment.snapshots import so_far
 from irl.policies import shelf
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
-from irl.rewards.averaged import averaged
+from irl.rewards.averaged import averaged, so_far
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from methods import RESULTS, irl
 
 from irl.core.provenance import command_line
 from irl.core.records import open_run
-from irl.envs.dynamics import DYNAMICS
+from irl.envs.dynamics import named
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 
@@ -66,8 +66,7 @@ class Settings:
 
 def truth(settings: Settings, task: str) -> list[float]:
     """Returns of PPO on the hand-written reward there, by its seeds."""
-    changed = dict(word.split("=") for word in settings.dynamics)
-    name = full_name(task, (json.dumps({DYNAMICS: {k: float(v) for k, v in changed.items()}}),))
+    name = full_name(task, named(settings.dynamics))
     found = []
     for seed in settings.truth_seeds:
         folder = settings.work / f"truth-{task_name(name)}-{settings.steps}-s{seed}"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from irl.core.errors import UserError
+from irl.envs.dynamics import named
 from irl.envs.make import make
 from irl.envs.names import full_name
 from irl.envs.rollouts import random_act, rollout
@@ -74,6 +75,12 @@ def test_a_factor_of_1_is_the_task_itself_and_two_makings_are_one() -> None:
     np.testing.assert_array_equal(played(own), played(unchanged))
     np.testing.assert_array_equal(played(heavy), played(heavy))
     assert not np.array_equal(played(own)[:5], played(heavy)[:5])
+
+
+def test_typed_changes_keep_their_kind_in_the_name() -> None:
+    assert full_name("Ant-v5", named(("disabled_legs=2",))) == 'Ant-v5?{"dynamics":{"disabled_legs":2}}'
+    assert full_name("Hopper-v5", named(("mass=1.5",))) == 'Hopper-v5?{"dynamics":{"mass":1.5}}'
+    assert named(()) == ()
 
 
 def test_no_file_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

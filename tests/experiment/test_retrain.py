@@ -176,6 +176,13 @@ def test_an_average_is_the_mean_of_the_snapshots_so_far(irl: Command) -> None:
 
 
 @pytest.mark.usefixtures("runs")
+def test_the_reward_of_one_snapshot_needs_no_other(irl: Command) -> None:
+    shutil.rmtree("gail/snapshots/000000128/reward")
+    irl("retrain", "gail", "--out", "again", *PPO)
+    assert "average_over" not in files.read_json(Path("again/reward.json"))
+
+
+@pytest.mark.usefixtures("runs")
 @pytest.mark.parametrize("algo", WORDS)
 def test_the_observations_are_normalised_as_the_reward_does_and_the_reward_stays_as_it_is(
     irl: Command, algo: str
