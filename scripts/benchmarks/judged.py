@@ -50,8 +50,10 @@ def short(content: Any) -> Any:
 def reward_name(config: dict[str, Any], found: dict[str, Any]) -> str:
     """The method, with the part or the inputs that are not its default."""
     states = config["discriminator"].get("inputs") == "obs"
+    part = found.get("part")
+    words = ("states" if states else None, None if part == "g" else part)
     average = "average" if found.get("average") else None
-    return "-".join(filter(None, (found["method"], "states" if states else None, found.get("part"), average)))
+    return "-".join(filter(None, (found["method"], *words, average)))
 
 
 def judged(run: Path, file: Path) -> dict[str, Any]:

@@ -15,7 +15,8 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-# methods.py, beside this file
+# beside this file
+from judged import reward_name
 from methods import RESULTS, Method, irl
 
 from irl.core.provenance import command_line
@@ -61,8 +62,10 @@ def cell(settings: Settings, run: Path, snapshot: int, part: str | None, name: s
     found = json.loads((folder / "retrain.json").read_text())
     beside = json.loads((run / "evaluation.json").read_text())["policy"]
     environment = json.loads((folder / "environment.json").read_text())
+    said = {"method": settings.method, "part": part, "average": "--average" in shlex.split(settings.extra)}
     return {
         "method": settings.method,
+        "reward": reward_name(open_run(run).config, said),
         "run": run.name,
         "snapshot": snapshot,
         "part": part,
