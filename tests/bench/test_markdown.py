@@ -12,7 +12,7 @@ from irl.bench.cells import Cell, expand
 from irl.bench.estimate import all_results
 from irl.bench.figure import curves
 from irl.bench.grid import SHIPPED, Grid, read_grid
-from irl.bench.markdown import section
+from irl.bench.markdown import section, summary
 from irl.bench.results import read_results
 from irl.bench.statistics import Estimate
 from irl.bench.typeset import estimate
@@ -45,6 +45,14 @@ def test_its_numbers_are_those_of_the_json(name: str, monkeypatch: pytest.Monkey
     assert read_part(DOCUMENT, name) == rebuilt(name)
     figure = BENCHMARKS / "results" / name / "curves.svg"
     assert figure.read_text() == curves(read_results(figure.parent, grid_of(name)[1]))
+
+
+def test_the_summary_in_readme_is_that_of_the_json() -> None:
+    grid, cells = grid_of("core")
+    readme = (BENCHMARKS.parents[1] / "README.md").read_text(encoding="utf-8")
+    figure = "scripts/benchmarks/results/core/curves.svg"
+    made = summary("core", read_results(BENCHMARKS / "results" / "core", cells), grid, figure)
+    assert read_part(readme, "core summary") == made
 
 
 def test_the_numbers_by_hand() -> None:
