@@ -39,7 +39,8 @@ def summary(name: str, results: Sequence[Result], grid: Grid | None, figure: str
     """What of it stands in README: the averages and the curves."""
     said = grid.title if grid and grid.title else name
     shown = f"![Score against steps of each method, a panel a task]({figure})"
-    made = f"*{said[:1].upper()}{said[1:]}. Made by `irl bench {name}`; every run and what this does not show: RESULTS.md.*"
+    said = said[:1].upper() + said[1:]
+    made = f"*{said}. Made by `irl bench {name}`; every run and what this does not show: RESULTS.md.*"
     return "\n\n".join([averages_table(arms_of(results)), shown, made]) + "\n"
 
 
