@@ -163,12 +163,16 @@ def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
 
     Terminations lead into the absorbing state if the reward knows one: memories have it, and PPO is paid for
     each step above what s_abs pays a step, which no discount of PPO's turns into another task
-    (`LearnedReward.anchored`).
+    (`LearnedReward.anchored`). Where the hand-written reward is asked for, it alone is paid, and nothing
+    after a termination.
     """
     net = reward.spec.net
-    learner = _learner(config, copy.deepcopy(reward.net.normaliser), net.absorbing_scale)
+    scale = 0.0 if config.hand_written else net.absorbing_scale
+    learner = _learner(config, copy.deepcopy(reward.net.normaliser), scale)
     there = reward.to(config.device)
     paid: RewardFn = there.anchored if isinstance(learner, PPOLearner) else there
+    if config.hand_written:
+        paid = HandWritten()
     if isinstance(learner, PPOLearner) and config.entropy:
         bound = net.log_pi_bound if isinstance(net, ShapedSpec) else BOUND
         paid = Entropic(paid, learner.log_pi, config.entropy, bound)

@@ -202,13 +202,15 @@ class RetrainRun:
     """Reinforcement learning on the frozen reward of a run's snapshot."""
 
     KIND: ClassVar[str] = "retrain"
-    ADDED: ClassVar[dict[str, Any]] = {"entropy": 0.0, "average": False}
+    ADDED: ClassVar[dict[str, Any]] = {"entropy": 0.0, "average": False, "hand_written": False}
     run: Path
     """The run whose reward it is."""
     snapshot: int
     """Environment steps of that run when the reward was saved."""
     average: bool
     """Whether it is the mean of that reward and those of the snapshots before it."""
+    hand_written: bool
+    """Whether the policy learns from the task's own reward instead."""
     env_id: str
     steps: int
     seed: int

@@ -77,6 +77,7 @@ def recorded(config: RetrainRun, reward: LearnedReward, snapshot: Path) -> dict[
         "gamma": spec.gamma,
         "weights_sha256": _digest(snapshot),
         **({"average_over": digests} if config.average else {}),
+        **({"hand_written": True} if config.hand_written else {}),
     }
 
 

@@ -35,7 +35,7 @@ from irl.policies.card import measure_random
 from irl.policies.policy import load_policy
 
 GATHERED, FORMAT, VERSION = "retrained.json", "irl.retrained", 1
-UNCHANGED = "as trained"
+UNCHANGED, HAND_WRITTEN = "as trained", "hand-written"
 KEY = ("snapshot", "part", "env_id", "algorithm", "env_steps")
 """What two retrainings have in common that are seeds of one row."""
 
@@ -111,6 +111,7 @@ def _result(config: RetrainRun) -> dict[str, Any]:
         found = {"seed": int(content["seed"]), "true": {"returns": list(content["true"]["returns"])}}
         found["reward"] = {name: content["reward"][name] for name in ("env_steps", "reward_map")}
         found["reward"]["average_over"] = dict(content["reward"].get("average_over", {}))
+        found["reward"]["hand_written"] = bool(content["reward"].get("hand_written"))
         return found | {name: content[name] for name in ("algorithm", "env_steps")}
     except (LookupError, TypeError, ValueError) as error:
         raise UserError(
@@ -138,7 +139,9 @@ def _still_to_do(command: Retrain, config: RetrainRun) -> Retrain | None:
     folder = RunFolder(config.out)
     if not (folder.path / "config.json").is_file():
         return command
-    changed = differences(without(folder.config, MAY_CHANGE), without(to_json(config), MAY_CHANGE))
+    # read, so that a setting that has come since then is what it was in effect
+    before = to_json(from_json(RetrainRun, folder.config, str(folder.path / "config.json")))
+    changed = differences(without(before, MAY_CHANGE), without(to_json(config), MAY_CHANGE))
     if changed:
         raise UserError(
             f"{folder.path} is a run with other settings: {'; '.join(changed):.300}; choose another --out"
@@ -154,9 +157,10 @@ def _empty_row(result: Mapping[str, Any], learned: str, trained: str) -> dict[st
     other = [f"{name}={value}" for name, value in sorted(now.items()) if own.get(name) != value]
     inner = [f"{k}={v}" for k, v in sorted(now.get("dynamics", {}).items())]
     words = [*[word for word in other if not word.startswith("dynamics=")], *inner]
+    part = result["reward"]["reward_map"] + (f", mean of {len(over)}" if over else "")
     return {
         "snapshot": result["reward"]["env_steps"],
-        "part": result["reward"]["reward_map"] + (f", mean of {len(over)}" if over else ""),
+        "part": HAND_WRITTEN if result["reward"].get("hand_written") else part,
         "dynamics": " ".join(words) or UNCHANGED,
         "env_id": trained,
         "algorithm": result["algorithm"],

@@ -54,6 +54,9 @@ class Retrain:
     average: bool = False
     """The mean of the rewards of this snapshot and of those before it, the untrained one left out: of what a
     fresh policy does first, early ones know more than the last."""
+    hand_written: bool = False
+    """Learn from the task's own reward instead, all else as it is, first weights and normaliser too: what the
+    same learner makes of that in as many steps is what a recovered reward is held against."""
     env_kwargs: Words = ()
     """Retrain where the task is another: what the environment is given beside what the run's was, name=value
     or a JSON object. Observations and actions must be of the same sizes."""
@@ -70,8 +73,8 @@ class Retrain:
     """Several, one after the other, each into a folder of its own, in --out where it is given. RUN's
     retrained.json then has their ratio to the policy beside the reward; what is done is not done again."""
     out: Path | None = None
-    """Run folder; runs/retrain-<run>-<step>[-average][-<part>][-<task>]-<algo>-s<seed> unless given; the
-    task where it is not the run's."""
+    """Run folder; runs/retrain-<run>-<step>[-average][-<part>][-hand-written][-<task>]-<algo>-s<seed> unless
+    given; the task where it is not the run's."""
     policies_root: Path | None = None
     """Where the shelf is, whose card gives the score; expert_data/policies unless given."""
     entropy: float = 0.0
@@ -98,6 +101,8 @@ class Retrain:
         check_at_least(self, 0, "entropy")
         for seed in (*self.seeds, *(() if self.seed is None else (self.seed,))):
             check_seed(seed)
+        if self.hand_written and (self.part is not None or self.average):
+            raise ValueError("--hand-written learns from no learned reward; leave --part and --average away")
         if self.seeds and (self.seed is not None or self.resume is not None):
             raise ValueError("--seeds begins or goes on with each of them; leave --seed and --resume away")
         if len(set(self.seeds)) < len(self.seeds):
@@ -170,11 +175,13 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
     source = command.run.resolve()
     env_id = full_name(its.env_id, (*command.env_kwargs, *named(command.dynamics)))
     of = ("-average" if command.average else "") + (f"-{command.part}" if command.part else "")
+    of += "-hand-written" if command.hand_written else ""
     of += f"-{task_name(env_id)}" if env_id != its.env_id else ""
     return RetrainRun(
         run=source,
         snapshot=step,
         average=command.average,
+        hand_written=command.hand_written,
         env_id=env_id,
         steps=its.steps if command.steps is None else command.steps,
         seed=seed,

@@ -104,10 +104,10 @@ def _learned(reward: LearnedReward, episodes: Sequence[Episode]) -> dict[str, An
 
 def _table(result: dict[str, Any]) -> Table:
     reward, true = result["reward"], result["true"]
-    title = escape(
-        f"{result['algorithm']}, {result['env_steps']} steps on the reward of {reward['run']} at step "
-        f"{reward['env_steps']}; {result['episodes']} deterministic episodes"
-    )
+    of = f"the reward of {reward['run']} at step {reward['env_steps']}"
+    of = f"the hand-written reward, judged by {of}" if reward.get("hand_written") else of
+    learner = f"{result['algorithm']}, {result['env_steps']} steps"
+    title = escape(f"{learner} on {of}; {result['episodes']} deterministic episodes")
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for column in ("return", "mean ± std", "worst", "score"):
         table.add_column(column, no_wrap=True)

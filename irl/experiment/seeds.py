@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from irl.core import files
-from irl.core.config import to_json
+from irl.core.config import from_json, to_json
 from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.records import RunFolder, open_run
@@ -64,7 +64,9 @@ def _is_there(run: FromDemonstrations) -> bool:
     assert run.out is not None
     if not (run.out / "config.json").is_file():
         return False
-    asked, there = to_json(run.resolved()), open_run(run.out).config
+    # read, so that a setting that has come since then is what it was in effect
+    read = from_json(FromDemonstrations, open_run(run.out).config, str(run.out / "config.json"))
+    asked, there = to_json(run.resolved()), to_json(read)
     if changed := differences(without(there, MAY_CHANGE), without(asked, MAY_CHANGE)):
         raise UserError(
             f"{run.out} is there with other settings: {'; '.join(changed)}. Choose another folder with --out"

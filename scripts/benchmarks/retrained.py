@@ -1,6 +1,7 @@
 """What a recovered reward teaches a policy that never met the discriminator: from random weights, frozen.
 
     python scripts/benchmarks/retrained.py dac --tasks Hopper-v5 --seeds 1 2 3
+    python scripts/benchmarks/retrained.py airl --seeds 1 2 3 --shares 1.0 --extra=--hand-written --out OTHER
 
 Takes the runs that methods.py left, their snapshots at these shares of the steps, fixed beforehand, and
 trains a policy on each by `irl retrain`. Its seeds are none of the run's. The figure is the true return of
@@ -62,10 +63,11 @@ def cell(settings: Settings, run: Path, snapshot: int, part: str | None, name: s
     found = json.loads((folder / "retrain.json").read_text())
     beside = json.loads((run / "evaluation.json").read_text())["policy"]
     environment = json.loads((folder / "environment.json").read_text())
-    said = {"method": settings.method, "part": part, "average": "--average" in shlex.split(settings.extra)}
+    words = shlex.split(settings.extra)
+    said = {"method": settings.method, "part": part, "average": "--average" in words}
     return {
         "method": settings.method,
-        "reward": reward_name(open_run(run).config, said),
+        "reward": "hand-written" if "--hand-written" in words else reward_name(open_run(run).config, said),
         "run": run.name,
         "snapshot": snapshot,
         "part": part,

@@ -4,8 +4,8 @@
     python scripts/benchmarks/transferred.py --table
 
 Beside the fresh policies' returns by the hand-written reward stand the run's own policy, played there, and
-what PPO makes of the hand-written reward there with as many steps (`irl experts train`, by the task's own
-recipe where it has one). One JSON a run and dynamics; one that is there is not made again.
+what the same learner makes of the hand-written reward there with as many steps (`irl retrain
+--hand-written`). One JSON a run and dynamics; one that is there is not made again.
 """
 
 import json
@@ -22,9 +22,6 @@ from methods import RESULTS, irl
 
 from irl.core.provenance import command_line
 from irl.core.records import open_run
-from irl.envs.dynamics import named
-from irl.envs.names import full_name
-from irl.envs.tasks import task_name
 
 KEPT = (
     "snapshot",
@@ -54,8 +51,6 @@ class Settings:
     """Environment steps of each."""
     extra: str = ""
     """More words for `irl retrain`; they are written into the result."""
-    truth_seeds: tuple[int, ...] = (1001,)
-    """Of PPO on the hand-written reward."""
     work: Path = Path("runs/transfer")
     """Where the new run folders are."""
     out: Path = RESULTS / "transfer"
@@ -64,35 +59,31 @@ class Settings:
     """Print what is there."""
 
 
-def truth(settings: Settings, task: str) -> list[float]:
-    """Returns of PPO on the hand-written reward there, by its seeds."""
-    name = full_name(task, named(settings.dynamics))
-    found = []
-    for seed in settings.truth_seeds:
-        folder = settings.work / f"truth-{task_name(name)}-{settings.steps}-s{seed}"
-        shelf = folder.parent / f"{folder.name}-shelf"
-        words = ["--algo", "ppo", "--steps", str(settings.steps), "--seed", str(seed), "--out", str(folder)]
-        if not (cards := list(shelf.rglob("card.json"))):
-            irl("experts", "train", "--env-id", name, *words, "--policies-root", str(shelf))
-            cards = list(shelf.rglob("card.json"))
-        found.append(json.loads(cards[0].read_text())["return_mean"])
-    return found
+def taught(settings: Settings, run: Path, words: list[str]) -> tuple[dict[str, Any], Path]:
+    """Fresh policies there, the row of `irl retrain --seeds` and where their folders are."""
+    of = [word.strip("-") for word in words if word in ("--average", "--hand-written")]
+    folder = settings.work / "-".join([run.name, *settings.dynamics, *of])
+    given = ["--algo", "ppo", "--steps", str(settings.steps), "--out", str(folder)]
+    seeds = ["--seeds", *map(str, settings.seeds)]
+    irl("retrain", str(run), *seeds, "--dynamics", *settings.dynamics, *given, *words)
+    return json.loads((run / "retrained.json").read_text())["rows"][-1], folder
 
 
 def cell(settings: Settings, run: Path, config: dict[str, Any]) -> dict[str, Any]:
     """Retrain there, and say what it came to."""
-    folder = settings.work / f"{run.name}-{'-'.join(settings.dynamics)}{'-average' * _averages(settings)}"
-    words = ["--algo", "ppo", "--steps", str(settings.steps), "--out", str(folder)]
-    seeds = ["--seeds", *map(str, settings.seeds)]
-    irl("retrain", str(run), *seeds, "--dynamics", *settings.dynamics, *words, *shlex.split(settings.extra))
-    row = json.loads((run / "retrained.json").read_text())["rows"][-1]
+    words = shlex.split(settings.extra)
+    row, folder = taught(settings, run, words)
+    # the same learner's words without what chooses the reward
+    part = words.index("--part") if "--part" in words else len(words)
+    learner = [word for i, word in enumerate(words) if word != "--average" and i not in (part, part + 1)]
+    truth, _ = taught(settings, run, [*learner, "--hand-written"])
     environment = json.loads(next(folder.glob("*/environment.json")).read_text())
     return {
         "reward": _reward(settings, config),
         "run": run.name,
         "task": config["env_id"],
         **{name: row[name] for name in KEPT},
-        "truth": truth(settings, config["env_id"]),
+        "truth": truth["returns"],
         "extra": settings.extra,
         "command": f"python scripts/benchmarks/{command_line()}",
         **{name: value for name, value in environment.items() if name != "command"},

@@ -21,6 +21,8 @@ from judged import RESULTS as REWARDS
 
 LEARNER = "--ppo.ent-coef 0.01 --ppo.ent-schedule linear"
 """PPO whose bonus on its entropy falls to 0: the words of `irl retrain` that a row must have been made by."""
+HAND_WRITTEN = "hand-written"
+"""The reward of a control: the same learner, and the task's own reward."""
 HEAD = (
     "reward",
     "task",
@@ -33,7 +35,8 @@ HEAD = (
     "explained",
     "Kendall",
     "a fresh policy",
-    "elsewhere: its policy, a fresh one",
+    "of the hand-written",
+    "elsewhere: its policy, a fresh one, of the hand-written",
     "verdicts",
 )
 
@@ -69,17 +72,19 @@ def same(row: dict[str, Any], found: dict[str, Any]) -> bool:
     """Whether a policy was retrained by the learner, on this reward as it was at the end."""
     run = f"{found['method']}-{found['task'].removesuffix('-v5').lower()}-s{found['seed']}"
     by = LEARNER in row["extra"] and row["snapshot"] == found["env_steps"]
-    return by and row["run"] == run and reward_of(row) == found["reward"]
+    return by and row["run"] == run and reward_of(row) in (found["reward"], HAND_WRITTEN)
 
 
 def line(found: dict[str, Any], fresh: list[dict[str, Any]], elsewhere: list[dict[str, Any]]) -> str:
     """A row; a dash is what is unknown, or may not be believed."""
+    control = [row for row in fresh if reward_of(row) == HAND_WRITTEN]
+    fresh = [row for row in fresh if reward_of(row) != HAND_WRITTEN]
     terms, weights = found["terms"], found["terms"].get("weights") or {}
     forward, ctrl = weights.get("forward", {}), weights.get("ctrl", {})
     believed = ctrl.get("relative") if ctrl.get("why_not") is None else None
     taught = [f"{row['score']:.3f} ({row['score'] / row['score_of_the_run']:.2f})" for row in fresh]
     there = [
-        f"{row['dynamics']}: {row['beside']:.0f}, {' '.join(f'{of:.0f}' for of in row['returns'])}"
+        f"{row['dynamics']}: {row['beside']:.0f}, {returns(row['returns'])}, {returns(row['truth'])}"
         for row in elsewhere
     ]
     cells = (
@@ -94,10 +99,16 @@ def line(found: dict[str, Any], fresh: list[dict[str, Any]], elsewhere: list[dic
         _two(terms.get("explained")),
         _two(found["cross_play"]["kendall"]["value"]),
         "; ".join(taught) or "–",
+        "; ".join(f"{row['score']:.3f}" for row in control) or "–",
         "; ".join(there) or "–",
         ", ".join(name for name, fired in found["verdicts"].items() if fired) or "none",
     )
     return f"| {' | '.join(cells)} |"
+
+
+def returns(values: list[float]) -> str:
+    """One a fresh seed."""
+    return " ".join(f"{value:.0f}" for value in values)
 
 
 def _two(value: float | None) -> str:

@@ -84,10 +84,13 @@ def equal(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:
 
 
 def settings(
-    learner: PPOConfig | SACConfig | TD3Config, env_id: str = TASK, entropy: float = 0.0
+    learner: PPOConfig | SACConfig | TD3Config,
+    env_id: str = TASK,
+    entropy: float = 0.0,
+    hand_written: bool = False,
 ) -> RetrainRun:
-    watch = Watch(eval_every=3)
-    return RetrainRun(Path("run"), 128, False, env_id, 400, 3, Path("out"), learner, entropy, watch, "cpu", 2)
+    reward, watch = (Path("run"), 128, False, hand_written), Watch(eval_every=3)
+    return RetrainRun(*reward, env_id, 400, 3, Path("out"), learner, entropy, watch, "cpu", 2)
 
 
 @pytest.mark.usefixtures("runs")
@@ -173,6 +176,41 @@ def test_an_average_is_the_mean_of_the_snapshots_so_far(irl: Command) -> None:
     assert found["learned"]["return_mean"] * len(starts) == pytest.approx(sum(paid), rel=1e-4)
     (row,) = files.read_json(Path("gail/retrained.json"))["rows"]
     assert row["part"] == f"gail, mean of {len(over)}"
+
+
+@pytest.mark.usefixtures("runs")
+@pytest.mark.parametrize("algo", WORDS)
+def test_the_hand_written_reward_is_learned_from_by_the_same_learner(irl: Command, algo: str) -> None:
+    irl("retrain", "gail", "--out", "learned", *WORDS[algo])
+    irl("retrain", "gail", "--hand-written", "--seeds", "1000", "--out", "control", *WORDS[algo])
+    (control,) = Path("control").iterdir()
+    assert control.name == f"retrain-gail-768-hand-written-{algo}-s1000"
+    learned, written = policies("learned"), policies(control)
+    assert equal(learned[0], written[0])
+    assert not equal(learned[-1], written[-1])
+    assert files.read_json(control / "retrain.json")["reward"]["hand_written"] is True
+    assert "hand_written" not in files.read_json(Path("learned/retrain.json"))["reward"]
+    (row,) = files.read_json(Path("gail/retrained.json"))["rows"]
+    assert row["part"] == "hand-written"
+    # begun before there was a setting, whose default is what it was then
+    older = {k: v for k, v in files.read_json(control / "config.json").items() if k != "average"}
+    files.write_json(control / "config.json", older)
+    irl("retrain", "gail", "--hand-written", "--seeds", "1000", "--out", "control", *WORDS[algo])
+    # nothing of the learned reward decides it
+    irl("retrain", "gail", "--hand-written", "--snapshot", "128", "--out", "early", *WORDS[algo])
+    assert all(equal(a, b) for a, b in zip(policies("early"), written, strict=True))
+
+
+@pytest.mark.usefixtures("runs")
+@pytest.mark.parametrize("learner", [PPOConfig(n_envs=2, steps_per_round=256, batch_size=64), OFF_POLICY])
+def test_of_the_hand_written_reward_a_termination_stays_one(learner: PPOConfig | SACConfig) -> None:
+    algorithm = build.on_frozen(settings(learner, "Cliff-v0", hand_written=True), load_reward("dac"))
+    batch = algorithm.learner.collect()
+    algorithm.learner.close()
+    assert batch.reward is not None
+    assert torch.equal(algorithm.reward(batch), batch.reward)
+    assert batch.absorbing is None or not batch.absorbing.any()
+    assert not isinstance(learner, SACConfig) or batch.terminated.any()
 
 
 @pytest.mark.usefixtures("runs")
@@ -309,6 +347,10 @@ MISTAKES = {
     "a snapshot that is not there": ("retrain gail --snapshot 5", ["5", "768", "--snapshot"]),
     "no steps": ("retrain gail --steps 0", ["steps", "0"]),
     "a negative seed": ("retrain gail --seed -1", ["seed", "-1"]),
+    "a part of the hand-written reward": (
+        "retrain gail --hand-written --part g",
+        ["--hand-written", "--part"],
+    ),
     "negative entropy": ("retrain gail --entropy -1", ["entropy", "-1"]),
     "entropy beside SAC's": ("retrain gail --algo sac --entropy 1", ["--entropy", "PPO", "--sac.ent-coef"]),
     "settings of the other learner": ("retrain gail --sac.lr 0.1", ["--sac.*", "--algo sac"]),
