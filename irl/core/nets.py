@@ -134,3 +134,16 @@ def fitted_normaliser(obs: Float[Tensor, "B O"]) -> Normaliser:
     normaliser = Normaliser(obs.shape[1])
     normaliser.update(obs)
     return normaliser
+
+
+def mixed_normaliser(a: Normaliser, b: Normaliser) -> Normaliser:
+    """A normaliser with the moments of draws from one or the other, as often from each.
+
+    mean = (m_a + m_b) / 2,   var = (v_a + v_b) / 2 + ((m_a - m_b) / 2)^2
+    """
+    mixed = Normaliser(len(a.mean))
+    apart = (a.mean.double() - b.mean.double()) / 2
+    mixed.mean.copy_(b.mean.double() + apart)
+    mixed.var.copy_((a.var.double() + b.var.double()) / 2 + apart.square())
+    mixed.count.copy_(a.count + b.count)
+    return mixed

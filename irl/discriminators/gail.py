@@ -5,7 +5,7 @@
     r  =   -log(1 - D(s,a))                                                   (maps.gail)
 
 Differs from the paper: the expert has label 1 (the paper has 0); the gradient penalty (the paper has
-none; Gulrajani et al. 2017); observations are normalised by the demonstrations' fixed moments; no
+none; Gulrajani et al. 2017); observations are normalised by fixed moments, the demonstrations'; no
 causal-entropy term here, the learner has its own; the policy step is any learner that takes a RewardFn
 (the paper uses TRPO). Other losses, rewards, penalties and the absorbing state are settings, off by default.
 """

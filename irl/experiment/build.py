@@ -13,7 +13,7 @@ from irl.algorithms.forward import Forward
 from irl.algorithms.interleaved import Interleaved
 from irl.core.errors import UserError
 from irl.core.finite import check_finite, named
-from irl.core.nets import Normaliser, fitted_normaliser
+from irl.core.nets import Normaliser, fitted_normaliser, mixed_normaliser
 from irl.core.rng import episode_seeds, stream, torch_stream
 from irl.core.types import Episode, RewardFn, Transitions, from_episodes
 from irl.discriminators.airl import AIRL, AIRLConfig
@@ -23,6 +23,7 @@ from irl.discriminators.gail import GAIL
 from irl.envs.absorbing import subsample
 from irl.envs.discrete import OneHot
 from irl.envs.make import make as make_env
+from irl.envs.rollouts import random_act, rollouts
 from irl.experiment.configs import (
     AIRLRun,
     BCRun,
@@ -42,6 +43,8 @@ from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
 from irl.rewards.shaped import ShapedSpec
 
+RANDOM_EPISODES = 20
+"""Of random actions, where observations are normalised by them too."""
 AnyLearner = PPOLearner | SACLearner | TD3Learner
 
 
@@ -86,8 +89,7 @@ def demonstrations(config: FromDemonstrations, episodes: Sequence[Episode]) -> T
 def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | Interleaved:
     """A discriminator and a learner on these demonstrations."""
     expert = demonstrations(config, episodes)
-    real = expert.obs if expert.absorbing is None else expert.obs[~expert.absorbing]
-    normaliser = fitted_normaliser(real)
+    normaliser = _normaliser(config, expert)
     scale = absorbing_scale(config)
     # a copy for each side: both move their own to their device
     learner = _learner(config, copy.deepcopy(normaliser), scale)
@@ -99,6 +101,16 @@ def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | I
         return Interleaved(learner, discriminator, expert, config.schedule, rng)
     absorbing = isinstance(config, AIRLRun) and scale > 0
     return Adversarial(learner, discriminator, expert, config.schedule, rng, absorbing=absorbing)
+
+
+def _normaliser(config: Imitation, expert: Transitions) -> Normaliser:
+    """Of the demonstrations, or of these and as many steps of random actions as a few episodes have."""
+    fitted = fitted_normaliser(expert.obs if expert.absorbing is None else expert.obs[~expert.absorbing])
+    if config.normaliser == "expert":
+        return fitted
+    act = random_act(_actions(config.env_id), stream(config.seed, "random actions"))
+    played = rollouts(config.env_id, act, episode_seeds(config.seed, "random actions", RANDOM_EPISODES))
+    return mixed_normaliser(fitted, fitted_normaliser(from_episodes(played).obs))
 
 
 def cloning(config: BCRun, episodes: Sequence[Episode], held_out: Sequence[Episode]) -> BC:

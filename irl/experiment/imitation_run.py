@@ -119,7 +119,11 @@ class AdversarialRun(ImitationRun):
     """What every method with a discriminator is told besides."""
 
     ADDED: ClassVar[dict[str, Any]] = ImitationRun.ADDED | {"warm_start": to_json(WarmStartConfig())}
-    ADDED |= {"preset": ""}
+    ADDED |= {"preset": "", "normaliser": "expert"}
     preset: str = ""
     """Settings of a paper, over which typed ones go; irl/experiment/presets.py has each with its source."""
     warm_start: WarmStartConfig = field(default_factory=WarmStartConfig)
+    normaliser: Literal["expert", "mixed"] = "expert"
+    """Whose mean and deviation observations are normalised by, fixed all through: the demonstrations', or
+    those of the demonstrations and of random actions, evenly. Where an expert holds a joint still, any other
+    place of it is many of its deviations away, and from ten on one is as far as another."""

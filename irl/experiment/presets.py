@@ -201,6 +201,24 @@ PRESETS: dict[str, Preset] = {
         "nothing: it is irl's own",
         _STEADY | {"steps": 150_000, "schedule.expert_share": 0.25},
     ),
+    "gail-ant": Preset(
+        "gail",
+        "scripts/benchmarks/RESULTS.md: with the defaults half of PPO's ratios are clipped each round, its "
+        "deviation is gone by 300k steps, and it learns to stand as the expert does, never to run",
+        "nothing: it is irl's own",
+        _STEADY
+        | {
+            "steps": 1_000_000,
+            "normaliser": "mixed",
+            "learner.gae_lambda": 0.9,
+            "learner.steps_per_round": 4096,
+            "learner.n_epochs": 10,
+            "learner.lr": 3e-4,
+            "learner.target_kl": 0.03,
+            "learner.hidden": (128, 128),
+            "learner.average": 0.95,
+        },
+    ),
     "airl-walker2d": Preset(
         "airl",
         "scripts/benchmarks/RESULTS.md: with the penalty at 10 f is no steeper than 1, the policy no "

@@ -8,7 +8,16 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from torch import nn
 
-from irl.core.nets import CLIP, NO_CLIP, Normaliser, SpectralLinear, fitted_normaliser, linear, mlp
+from irl.core.nets import (
+    CLIP,
+    NO_CLIP,
+    Normaliser,
+    SpectralLinear,
+    fitted_normaliser,
+    linear,
+    mixed_normaliser,
+    mlp,
+)
 from irl.core.rng import torch_stream
 
 columns = arrays(
@@ -96,6 +105,16 @@ def test_a_constant_observation_is_only_centred() -> None:
     # a spread of rounding size is noise and is not blown up
     noisy = fitted_normaliser(torch.tensor([[0.0], [1e-7]]))
     assert float(noisy(torch.tensor([[1e-7]])).abs()) < 1e-6
+
+
+def test_a_mixed_normaliser_has_the_moments_of_both_as_if_there_were_as_many_of_each() -> None:
+    rng = np.random.default_rng(0)
+    many, few = rng.normal(2.0, 0.1, (600, 3)), rng.normal(-5.0, [3.0, 1e-3, 7.0], (40, 3))
+    mixed = mixed_normaliser(*(fitted_normaliser(torch.tensor(x, dtype=torch.float32)) for x in (many, few)))
+    whole = np.concatenate([many, np.repeat(few, 15, axis=0)])
+    np.testing.assert_allclose(mixed.mean.numpy(), whole.mean(0), rtol=1e-5)
+    np.testing.assert_allclose(mixed.std.numpy(), whole.std(0), rtol=1e-5)
+    assert mixed.count == 640
 
 
 def test_outliers_are_clipped_on_both_sides() -> None:

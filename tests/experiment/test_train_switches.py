@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -11,11 +12,15 @@ from irl.algorithms.adversarial import ReplayedScheduleConfig
 from irl.algorithms.interleaved import InterleavedConfig
 from irl.core import files
 from irl.core.records import open_run
+from irl.core.rng import episode_seeds
 from irl.core.types import from_episodes
 from irl.demos.load import load_demos
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
+from irl.envs.make import make
+from irl.envs.rollouts import random_act, rollouts
+from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
 from irl.rewards.ensemble import EnsembleNet
 from tests.experiment.conftest import DATASET, LOOK, QUICK, TASK
@@ -84,6 +89,27 @@ def test_the_scale_and_the_bound_of_rewards_reach_the_learner_and_not_the_saved_
     (newest / "state.safetensors").write_bytes(b"torn")
     irl("train", "--resume", "dac")
     assert (last("dac") / "policy.safetensors").read_bytes() == before
+
+
+def test_observations_are_normalised_by_random_actions_too_where_it_is_asked_for(irl: Command) -> None:
+    for name in ("expert", "mixed"):
+        irl("train", "gail", *WORDS, f"--normaliser={name}", "--seed=3", "--out", name)
+    own, both = (load_reward(name).net.normaliser for name in ("expert", "mixed"))
+    batch = from_episodes(load_demos(DATASET, episodes=4, seed=3))
+    torch.testing.assert_close(own.mean, batch.obs.mean(0))
+    # the middle of the two: what random actions see is as far on the other side
+    random, space = both.mean * 2 - own.mean, make(TASK).action_space
+    seeds = episode_seeds(0, "of the test", 200)
+    played = from_episodes(rollouts(TASK, random_act(space, np.random.default_rng(0)), seeds)).obs
+    assert ((random - played.mean(0)).abs() < 0.5 * played.std(0)).all()
+    spread = (own.var + played.var(0)) / 2 + (own.mean - both.mean).square()
+    torch.testing.assert_close(both.var, spread, rtol=0.5, atol=1e-3)
+    # the policy sees what D sees
+    weights = load_policy(last("mixed") / "policy.safetensors").weights
+    np.testing.assert_allclose(weights["obs_mean"], both.mean.numpy())
+    before = (last("mixed") / "policy.safetensors").read_bytes()
+    irl("train", "--config", "mixed/config.json", "--out", "again")
+    assert (last("again") / "policy.safetensors").read_bytes() == before
 
 
 def test_every_switch_is_in_the_table_with_its_source() -> None:
