@@ -209,6 +209,7 @@ CHANGED = GAILRun(
     threads=2,
     warm_start=WarmStartConfig(updates=7),
     preset="dac-paper",
+    normaliser="mixed",
 )
 EXPERT = ExpertRun("Hopper-v5", "expert", 10, 1, Path("runs/e"), PPO, WATCH, "cpu", 1)
 
