@@ -202,26 +202,6 @@ def test_the_hand_written_reward_is_learned_from_by_the_same_learner(irl: Comman
 
 
 @pytest.mark.usefixtures("runs")
-def test_of_the_hand_written_reward_a_termination_stays_one() -> None:
-    small = SACConfig(steps_per_round=200, learning_starts=300, batch_size=64, hidden=(8,))
-    algorithm = build.on_frozen(settings(small, "Cliff-v0", hand_written=True), load_reward("dac"))
-    seen: list[Transitions] = []
-
-    def remember(batch: Transitions) -> Tensor:
-        seen.append(batch)
-        return algorithm.reward(batch)
-
-    algorithm.learner.start(remember)
-    steps = [algorithm.learner.collect() for _ in range(2)]
-    algorithm.learner.close()
-    for batch in (*steps, *seen):
-        assert batch.reward is not None
-        assert torch.equal(algorithm.reward(batch), batch.reward)
-        assert batch.absorbing is None or not batch.absorbing.any()
-    assert any(bool(batch.terminated.any()) for batch in seen)
-
-
-@pytest.mark.usefixtures("runs")
 def test_the_reward_of_one_snapshot_needs_no_other(irl: Command) -> None:
     shutil.rmtree("gail/snapshots/000000128/reward")
     irl("retrain", "gail", "--out", "again", *PPO)
@@ -281,25 +261,30 @@ def test_a_run_that_died_is_resumed_to_the_same_end(
 
 
 @pytest.mark.usefixtures("runs")
-@pytest.mark.parametrize(("name", "env_id", "absorbs"), [("dac", "Cliff-v0", True), ("gail", TASK, False)])
+@pytest.mark.parametrize(
+    ("name", "env_id", "written", "absorbs"),
+    [("dac", "Cliff-v0", False, True), ("gail", TASK, False, False), ("dac", "Cliff-v0", True, False)],
+)
 def test_terminations_lead_into_the_absorbing_state_where_the_reward_knows_one(
-    name: str, env_id: str, absorbs: bool
+    name: str, env_id: str, written: bool, absorbs: bool
 ) -> None:
     small = SACConfig(steps_per_round=200, learning_starts=300, batch_size=64, hidden=(8,))
-    learner = build.on_frozen(settings(small, env_id), load_reward(name)).learner
+    algorithm = build.on_frozen(settings(small, env_id, hand_written=written), load_reward(name))
     seen: list[Transitions] = []
 
     def remember(batch: Transitions) -> Tensor:
         seen.append(batch)
         return torch.zeros(len(batch))
 
-    learner.start(remember)
-    steps = [learner.collect() for _ in range(2)]
-    learner.close()
-    assert any(bool(batch.terminated.any()) for batch in steps) == absorbs
+    algorithm.learner.start(remember)
+    steps = [algorithm.learner.collect() for _ in range(2)]
+    algorithm.learner.close()
+    assert any(bool(batch.terminated.any()) for batch in steps) == (env_id != TASK)
     assert len(seen) == 100
-    assert not any(bool(batch.terminated.any()) for batch in seen)
+    assert any(bool(batch.terminated.any()) for batch in seen) == written
     assert any(batch.absorbing is not None and bool(batch.absorbing.any()) for batch in seen) == absorbs
+    if written:
+        assert all(torch.equal(algorithm.reward(b), torch.as_tensor(b.reward)) for b in (*steps, *seen))
 
 
 @pytest.mark.usefixtures("runs")
