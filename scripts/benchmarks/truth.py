@@ -18,6 +18,7 @@ import tyro
 
 # beside this file
 from judged import RESULTS as REWARDS
+from judged import reward_name
 
 LEARNER = "--ppo.ent-coef 0.01 --ppo.ent-schedule linear"
 """PPO whose bonus on its entropy falls to 0: the words of `irl retrain` that a row must have been made by."""
@@ -63,9 +64,8 @@ def reward_of(row: dict[str, Any]) -> str:
     """The name that judged.py gives the reward which a policy was retrained on."""
     if "reward" in row:
         return row["reward"]
-    part = row["part"] if row["part"] != "g" else None
-    average = "average" if "--average" in shlex.split(row["extra"]) else None
-    return "-".join(filter(None, (row["method"], part, average)))
+    # older rows do not say it, and none of theirs is of states alone
+    return reward_name({"discriminator": {}}, row | {"average": "--average" in shlex.split(row["extra"])})
 
 
 def same(row: dict[str, Any], found: dict[str, Any]) -> bool:
