@@ -32,3 +32,22 @@ def test_switches_have_every_score() -> None:
     made = switches.table(switches.Settings()).splitlines()
     assert len(made) > 20
     assert [line for line in made if line not in lines("SWITCHES.md")] == []
+
+
+def test_a_control_is_by_the_same_learner_there() -> None:
+    truth = import_module("truth")
+
+    extra = f"--average --part f {truth.BONUS}"
+    row = {"run": "airl-hopper-s1", "env_steps": 9, "seeds": [1], "dynamics": "mass=1.5", "extra": extra}
+    control = row | {"run": "gail-hopper-s1", "extra": f"--hand-written {truth.BONUS}"}
+    assert truth.circumstances(row) == truth.circumstances(control)
+    others = (
+        {"run": "dac-hopper-s1"},
+        {"run": "airl-ant-s1"},
+        {"env_steps": 18},
+        {"seeds": [2]},
+        {"dynamics": "mass=2"},
+        {"extra": "--hand-written"},
+    )
+    for other in others:
+        assert truth.circumstances(row) != truth.circumstances(control | other)

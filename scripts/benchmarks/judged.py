@@ -22,6 +22,8 @@ import tyro
 from irl.envs.tasks import task_name
 
 RESULTS = Path(__file__).parent / "results" / "rewards"
+HAND_WRITTEN = "hand-written"
+"""The reward of a control: the same learner, and the task's own reward."""
 AGREEMENT = ("spearman", "kendall", "regret")
 DRIFT = ("snapshots", "n", "cycling", "speed", "to_final", "sign_flips", "outside")
 

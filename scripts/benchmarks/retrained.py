@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 # beside this file
-from judged import reward_name
+from judged import HAND_WRITTEN, reward_name
 from methods import RESULTS, Method, irl
 
 from irl.core.provenance import command_line
@@ -67,7 +67,7 @@ def cell(settings: Settings, run: Path, snapshot: int, part: str | None, name: s
     said = {"method": settings.method, "part": part, "average": "--average" in words}
     return {
         "method": settings.method,
-        "reward": "hand-written" if "--hand-written" in words else reward_name(open_run(run).config, said),
+        "reward": HAND_WRITTEN if "--hand-written" in words else reward_name(open_run(run).config, said),
         "run": run.name,
         "snapshot": snapshot,
         "part": part,

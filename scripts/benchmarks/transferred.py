@@ -1,11 +1,12 @@
 """What a recovered reward teaches where the dynamics are others: from random weights, frozen.
 
     python scripts/benchmarks/transferred.py runs/airl-hopper-s1 --dynamics mass=1.5 --extra=--average
+    python scripts/benchmarks/transferred.py runs/airl-hopper-s1 --dynamics mass=1.5 --extra=--hand-written
     python scripts/benchmarks/transferred.py --table
 
-Beside the fresh policies' returns by the hand-written reward stand the run's own policy, played there, and
-what the same learner makes of the hand-written reward there with as many steps (`irl retrain
---hand-written`). One JSON a run and dynamics; one that is there is not made again.
+Beside the fresh policies' returns by the hand-written reward stands the run's own policy, played there. The
+second command makes the control: what the same learner makes of the hand-written reward there; truth.py
+joins the two. One JSON a reward, run and dynamics; one that is there is not made again.
 """
 
 import json
@@ -17,7 +18,7 @@ from typing import Any
 import tyro
 
 # beside this file
-from judged import reward_name
+from judged import HAND_WRITTEN, reward_name
 from methods import RESULTS, irl
 
 from irl.core.provenance import command_line
@@ -59,58 +60,42 @@ class Settings:
     """Print what is there."""
 
 
-def taught(settings: Settings, run: Path, words: list[str]) -> tuple[dict[str, Any], Path]:
-    """Fresh policies there, the row of `irl retrain --seeds` and where their folders are."""
-    of = [word.strip("-") for word in words if word in ("--average", "--hand-written")]
-    folder = settings.work / "-".join([run.name, *settings.dynamics, *of])
-    given = ["--algo", "ppo", "--steps", str(settings.steps), "--out", str(folder)]
-    seeds = ["--seeds", *map(str, settings.seeds)]
-    irl("retrain", str(run), *seeds, "--dynamics", *settings.dynamics, *given, *words)
-    return json.loads((run / "retrained.json").read_text())["rows"][-1], folder
-
-
-def cell(settings: Settings, run: Path, config: dict[str, Any]) -> dict[str, Any]:
-    """Retrain there, and say what it came to."""
+def cell(settings: Settings, run: Path, reward: str, config: dict[str, Any]) -> dict[str, Any]:
+    """Retrain there, and say what it came to: a row of `irl retrain --seeds`."""
+    folder = settings.work / "-".join((reward, run.name, *settings.dynamics))
+    given = ("--algo", "ppo", "--steps", str(settings.steps), "--out", str(folder))
+    seeds = ("--seeds", *map(str, settings.seeds))
     words = shlex.split(settings.extra)
-    row, folder = taught(settings, run, words)
-    # the same learner's words without what chooses the reward
-    part = words.index("--part") if "--part" in words else len(words)
-    learner = [word for i, word in enumerate(words) if word != "--average" and i not in (part, part + 1)]
-    truth, _ = taught(settings, run, [*learner, "--hand-written"])
+    irl("retrain", str(run), *seeds, "--dynamics", *settings.dynamics, *given, *words)
+    row = json.loads((run / "retrained.json").read_text())["rows"][-1]
     environment = json.loads(next(folder.glob("*/environment.json")).read_text())
     return {
-        "reward": _reward(settings, config),
+        "reward": reward,
         "run": run.name,
         "task": config["env_id"],
         **{name: row[name] for name in KEPT},
-        "truth": truth["returns"],
         "extra": settings.extra,
         "command": f"python scripts/benchmarks/{command_line()}",
         **{name: value for name, value in environment.items() if name != "command"},
     }
 
 
-def _averages(settings: Settings) -> bool:
-    return "--average" in shlex.split(settings.extra)
-
-
 def _reward(settings: Settings, config: dict[str, Any]) -> str:
     words = shlex.split(settings.extra)
+    if "--hand-written" in words:
+        return HAND_WRITTEN
     part = words[words.index("--part") + 1] if "--part" in words else None
-    return reward_name(config, {"method": config["kind"], "part": part, "average": _averages(settings)})
+    return reward_name(config, {"method": config["kind"], "part": part, "average": "--average" in words})
 
 
 def table(out: Path) -> str:
     """A line a reward and dynamics."""
-    lines = ["| reward | task | dynamics | its own policy there | fresh policies | PPO on the hand-written |"]
-    lines.append("|---" * 6 + "|")
+    lines = ["| reward | task | dynamics | its own policy there | fresh policies |", "|---" * 5 + "|"]
     for file in sorted(out.glob("*.json")):
         found = json.loads(file.read_text())
-        fresh, true = (" ".join(f"{value:.0f}" for value in found[name]) for name in ("returns", "truth"))
+        fresh = " ".join(f"{value:.0f}" for value in found["returns"])
         whose = f"{found['reward']} ({found['run'].rpartition('-')[2]})"
-        lines.append(
-            f"| {whose} | {found['task']} | {found['dynamics']} | {found['beside']:.0f} | {fresh} | {true} |"
-        )
+        lines.append(f"| {whose} | {found['task']} | {found['dynamics']} | {found['beside']:.0f} | {fresh} |")
     return "\n".join(lines)
 
 
@@ -118,11 +103,12 @@ def main(settings: Settings) -> None:
     """Every one that has no result yet, then the table."""
     for run in settings.runs:
         config = open_run(run).config
-        name = "-".join((_reward(settings, config), run.name.split("-", 1)[1], *settings.dynamics))
+        reward = _reward(settings, config)
+        name = "-".join((reward, run.name.split("-", 1)[1], *settings.dynamics))
         file = settings.out / f"{name.replace('=', '-')}.json"
         if not file.is_file():
             file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(json.dumps(cell(settings, run, config), indent=1) + "\n")
+            file.write_text(json.dumps(cell(settings, run, reward, config), indent=1) + "\n")
     if settings.table:
         print(table(settings.out))
 

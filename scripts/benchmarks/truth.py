@@ -3,8 +3,8 @@
     python scripts/benchmarks/truth.py [--only airl gail] [--tasks Hopper-v5]
 
 Runs nothing: it joins what judged.py, retrained.py and transferred.py left in results. Of retrained policies
-those count that learned from the reward at the end of its run, by the one learner below. FINDINGS.md has the
-table, which a test makes again.
+those count that learned from the reward at the end of its run, by the task's learner below. FINDINGS.md has
+the table, which a test makes again.
 """
 
 import json
@@ -17,13 +17,19 @@ from typing import Any
 import tyro
 
 # beside this file
+from judged import HAND_WRITTEN, reward_name
 from judged import RESULTS as REWARDS
-from judged import reward_name
 
-LEARNER = "--ppo.ent-coef 0.01 --ppo.ent-schedule linear"
+from irl.envs.tasks import task_name
+
+BONUS = "--ppo.ent-coef 0.01 --ppo.ent-schedule linear"
 """PPO whose bonus on its entropy falls to 0: the words of `irl retrain` that a row must have been made by."""
-HAND_WRITTEN = "hand-written"
-"""The reward of a control: the same learner, and the task's own reward."""
+SHORT = (
+    "--ppo.gamma 0.98 --ppo.gae-lambda 0.9 --ppo.lr 3e-4 --ppo.lr-schedule constant --ppo.n-epochs 10 "
+    "--ppo.target-kl 0.03 --ppo.steps-per-round 4096 --ppo.hidden 128 128 --ppo.average 0.95"
+)
+"""Those of Ant-v5: PPO by the settings of `--preset gail-steady`."""
+LEARNERS = {"hopper": BONUS, "halfcheetah": BONUS, "ant": SHORT}
 HEAD = (
     "reward",
     "task",
@@ -68,25 +74,48 @@ def reward_of(row: dict[str, Any]) -> str:
     return reward_name({"discriminator": {}}, row | {"average": "--average" in shlex.split(row["extra"])})
 
 
+def learner(row: dict[str, Any]) -> str:
+    """The words by which a policy was retrained, without those that chose its reward."""
+    words = iter(shlex.split(row["extra"]))
+    kept: list[str] = []
+    for word in words:
+        if word == "--part":
+            next(words)
+        elif word not in ("--average", f"--{HAND_WRITTEN}"):
+            kept.append(word)
+    return " ".join(kept)
+
+
+def of_run(row: dict[str, Any]) -> tuple[str, str]:
+    """Method and task of the run whose reward it was, e.g. airl and hopper."""
+    method, _, task = row["run"].rpartition("-s")[0].rpartition("-")
+    return method, task
+
+
+def circumstances(row: dict[str, Any]) -> tuple[Any, ...]:
+    """All that a policy was retrained by but its reward; DAC's alone learn with an absorbing state."""
+    method, task = of_run(row)
+    seeds = tuple(row.get("seeds") or (row["seed"],))
+    return task, row.get("dynamics"), row["env_steps"], seeds, learner(row), method.startswith("dac")
+
+
 def same(row: dict[str, Any], found: dict[str, Any]) -> bool:
-    """Whether a policy was retrained by the learner, on this reward as it was at the end."""
-    run = f"{found['method']}-{found['task'].removesuffix('-v5').lower()}-s{found['seed']}"
-    by = LEARNER in row["extra"] and row["snapshot"] == found["env_steps"]
-    return by and row["run"] == run and reward_of(row) in (found["reward"], HAND_WRITTEN)
+    """Whether a policy was retrained by the task's learner, on this reward as it was at the end."""
+    task = task_name(found["task"])
+    by = learner(row) == LEARNERS[task] and row["snapshot"] == found["env_steps"]
+    run = f"{found['method']}-{task}-s{found['seed']}"
+    return by and row["run"] == run and reward_of(row) == found["reward"]
 
 
-def line(found: dict[str, Any], fresh: list[dict[str, Any]], elsewhere: list[dict[str, Any]]) -> str:
+def line(found: dict[str, Any], fresh: list[dict[str, Any]], controls: dict[tuple[Any, ...], Any]) -> str:
     """A row; a dash is what is unknown, or may not be believed."""
-    control = [row for row in fresh if reward_of(row) == HAND_WRITTEN]
-    fresh = [row for row in fresh if reward_of(row) != HAND_WRITTEN]
     terms, weights = found["terms"], found["terms"].get("weights") or {}
     forward, ctrl = weights.get("forward", {}), weights.get("ctrl", {})
     believed = ctrl.get("relative") if ctrl.get("why_not") is None else None
-    taught = [f"{row['score']:.3f} ({row['score'] / row['score_of_the_run']:.2f})" for row in fresh]
-    there = [
-        f"{row['dynamics']}: {row['beside']:.0f}, {returns(row['returns'])}, {returns(row['truth'])}"
-        for row in elsewhere
-    ]
+    here = [row for row in fresh if "dynamics" not in row]
+    control = [controls[key]["score"] for key in map(circumstances, here) if key in controls]
+    taught = [f"{row['score']:.3f} ({row['score'] / row['score_of_the_run']:.2f})" for row in here]
+    there = [elsewhere(row, controls.get(circumstances(row))) for row in fresh if "dynamics" in row]
     cells = (
         found["reward"],
         found["task"].removesuffix("-v5"),
@@ -99,11 +128,17 @@ def line(found: dict[str, Any], fresh: list[dict[str, Any]], elsewhere: list[dic
         _two(terms.get("explained")),
         _two(found["cross_play"]["kendall"]["value"]),
         "; ".join(taught) or "–",
-        "; ".join(f"{row['score']:.3f}" for row in control) or "–",
+        "; ".join(f"{score:.3f}" for score in control) or "–",
         "; ".join(there) or "–",
         ", ".join(name for name, fired in found["verdicts"].items() if fired) or "none",
     )
     return f"| {' | '.join(cells)} |"
+
+
+def elsewhere(row: dict[str, Any], control: dict[str, Any] | None) -> str:
+    """Returns under other dynamics: of the run's own policy, of fresh ones, and of the control's."""
+    true = returns(control["returns"]) if control else "–"
+    return f"{row['dynamics']}: {row['beside']:.0f}, {returns(row['returns'])}, {true}"
 
 
 def returns(values: list[float]) -> str:
@@ -118,7 +153,9 @@ def _two(value: float | None) -> str:
 def table(settings: Settings) -> str:
     """A line a reward and seed that judged.py has."""
     results = settings.results
-    fresh, elsewhere = list(read(results / "fresh")), list(read(results / "transfer"))
+    rows = [*read(results / "fresh"), *read(results / "transfer")]
+    fresh = [row for row in rows if "snapshot" in row]
+    controls = {circumstances(row): row for row in fresh if reward_of(row) == HAND_WRITTEN}
     judged = [found for found in read(results / "rewards") if "verdicts" in found]
     lines = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"]
     for found in sorted(judged, key=lambda of: (of["task"], of["method"], of["reward"], of["seed"])):
@@ -126,8 +163,7 @@ def table(settings: Settings) -> str:
             continue
         if settings.tasks and found["task"] not in settings.tasks:
             continue
-        here = [row for row in fresh if "snapshot" in row and same(row, found)]
-        lines.append(line(found, here, [row for row in elsewhere if same(row, found)]))
+        lines.append(line(found, [row for row in fresh if same(row, found)], controls))
     return "\n".join(lines)
 
 
