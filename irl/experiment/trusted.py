@@ -56,7 +56,7 @@ def judge_trust(seen: Seen, drift: Mapping[str, Any], seed: int) -> dict[str, An
         "residual": _residual(rewards[-1], seen.base, seed),
         "ledger": ledger_of(rewards[-1]),
         "chosen": chosen_of(losses(seen.rewards, seen.held_out, seen.fresh), returns, drift, cross),
-        "verdicts": [asdict(v) for v in verdicts(*_numbers(steps, drift, seen.base, fell))],
+        "verdicts": [asdict(v) for v in verdicts(*_numbers(steps, drift, seen.base, cross, fell))],
     }
 
 
@@ -110,7 +110,7 @@ def _residual(reward: LearnedReward, base: ProbeSet, seed: int) -> dict[str, Any
 
 
 def _numbers(
-    steps: Sequence[int], drift: Mapping[str, Any], base: ProbeSet, fell: Fell
+    steps: Sequence[int], drift: Mapping[str, Any], base: ProbeSet, cross: Mapping[str, Any], fell: Fell
 ) -> tuple[dict[str, float | None], dict[str, str]]:
     """The number behind each verdict by its name, and why one is not there."""
     last, before = steps[-1], list(zip(steps, drift["to_final"], strict=True))[:-1]
@@ -127,12 +127,14 @@ def _numbers(
         "flat": hygiene["std"],
         "saturated": (health["held_out"] or health["train"])["saturated"],
         "survival-biased": abs(bias) if ends and bias is not None else None,
+        "misleading": cross["agreement"][-1]["regret"]["value"] if "agreement" in cross else None,
     }
     reasons = {
         "close": truth.get("reason") or "the distance to the hand-written reward is not known",
         "moved": "there is no snapshot near half of the run that has a distance",
         "stable": "there is no snapshot in the last quarter of the run before its end that has a distance",
         "survival-biased": "no episode of the probe ends early",
+        "misleading": cross.get("reason") or "how far its favourite is from the best is not known",
     }
     if isinstance(fell, str):
         return numbers, reasons | dict.fromkeys(("collapsed", "hacked"), fell)

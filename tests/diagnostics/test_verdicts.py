@@ -14,6 +14,7 @@ HEALTHY = {
     "collapsed": 0.0,
     "saturated": 0.05,
     "survival-biased": 0.45,
+    "misleading": 0.0,
     "hacked": 0.05,
 }
 SICK = {
@@ -24,13 +25,14 @@ SICK = {
     "collapsed": 0.9,
     "saturated": 0.97,
     "survival-biased": 0.93,
+    "misleading": 0.98,
     "hacked": 0.6,
 }
 
 
-def test_there_are_eight_and_each_has_a_case() -> None:
+def test_there_are_nine_and_each_has_a_case() -> None:
     assert set(NAMES) == set(HEALTHY) == set(SICK)
-    assert len(NAMES) == len(RULES) == 8
+    assert len(NAMES) == len(RULES) == 9
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -122,8 +122,9 @@ def test_the_numbers_of_the_verdicts_are_where_their_rules_say() -> None:
         "health": [{"held_out": None, "train": {"saturated": 0.7}}],
         "hygiene": [hygiene(0.1), hygiene(-0.9)],
     }
+    played = {"agreement": [{"regret": {"value": 0.1}}, {"regret": {"value": 0.6}}]}
     never = ProbeSet(TASK, {"expert": tuple(pointmass.demonstrations(2))})
-    numbers, reasons = _numbers([0, 25, 50, 75, 100], drift, never, (0.0, 0.4))
+    numbers, reasons = _numbers([0, 25, 50, 75, 100], drift, never, played, (0.0, 0.4))
     assert numbers == {
         "close": 0.4,
         "moved": 0.3,
@@ -131,16 +132,22 @@ def test_the_numbers_of_the_verdicts_are_where_their_rules_say() -> None:
         "flat": 0.5,
         "saturated": 0.7,
         "survival-biased": None,
+        "misleading": 0.6,
         "collapsed": 0.0,
         "hacked": 0.4,
     }
     assert "ends early" in reasons["survival-biased"]
     untold = drift | {"to_truth": [{"value": None, "reason": "the hand-written reward is constant"}]}
-    assert "is constant" in _numbers([0, 100], untold | {"to_final": [0.9, 0.0]}, never, "")[1]["close"]
-    two, _ = _numbers([0, 100], drift | {"to_final": [0.9, 0.0]}, never, "unknown")
-    assert two["moved"] is two["stable"] is None
+    alone = {"reason": "one policy is no order"}
+    assert (
+        "is constant" in _numbers([0, 100], untold | {"to_final": [0.9, 0.0]}, never, alone, "")[1]["close"]
+    )
+    two, why = _numbers([0, 100], drift | {"to_final": [0.9, 0.0]}, never, alone, "unknown")
+    assert two["moved"] is two["stable"] is two["misleading"] is None
+    assert why["misleading"] == "one policy is no order"
     fell = rollouts("Cliff-v0", lambda obs: np.ones(2), [0])
-    numbers, _ = _numbers([0, 100], drift | {"to_final": [0.9, 0.0]}, ProbeSet(TASK, {"x": tuple(fell)}), "")
+    ended = ProbeSet(TASK, {"x": tuple(fell)})
+    numbers, _ = _numbers([0, 100], drift | {"to_final": [0.9, 0.0]}, ended, played, "")
     assert numbers["survival-biased"] == 0.9
 
 

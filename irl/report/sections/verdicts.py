@@ -19,6 +19,7 @@ LINKS = {
     "collapsed": "policy",
     "saturated": "moved",
     "survival-biased": "terms",
+    "misleading": "crossplay",
     "hacked": "gold",
 }
 
