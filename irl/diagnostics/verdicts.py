@@ -116,8 +116,8 @@ RULES: tuple[Rule, ...] = (
         True,
         "top-1 regret of the last reward in cross-play (0 where the policy that it pays most is the best, 1 "
         "where it is the worst) is above the threshold",
-        "The policy that it pays most is a poor one by the hand-written reward: whoever looks for more of it, "
-        "and can find that policy, ends there.",
+        "The policy that it pays most is a poor one by the hand-written reward: whoever looks for more of "
+        "it, and can find that policy, ends there.",
         "The policy that it pays most is the best of those that were played, or nearly.",
     ),
     Rule(
