@@ -21,23 +21,29 @@ from irl.core.types import Metrics, Transitions
 
 @dataclass(frozen=True)
 class ScheduleConfig:
-    """How long the discriminator learns in each round."""
+    """How long the discriminator learns in each round, and from which of the policy's steps."""
+
+    ADDED: ClassVar[dict[str, Any]] = {"memory": 0}
 
     batch_size: int = 256
     """Expert and policy transitions of one gradient step, each."""
     epochs: int = 5
-    """Passes over each rollout. With too few D stays behind the policy and leads it astray (its loss is
-    then above log 4); with many in the first rounds it is certain before the policy can follow."""
+    """Passes over each rollout, or as long as one with a memory. With too few D stays behind the policy and
+    leads it astray (its loss is then above log 4); with many in the first rounds it is certain before the
+    policy can follow."""
+    memory: int = 0
+    """Steps of older rollouts that are drawn from as well, a uniform sample of all; 0 keeps none. A reward
+    that is told of the newest policies alone forgets what was wrong with the ones before them, and pays a
+    fresh policy for it. They are in each checkpoint, too: 200,000 are 170 MB on Ant."""
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "batch_size", "epochs")
+        check_at_least(self, 0, "memory")
 
 
 @dataclass(frozen=True)
 class ReplayedScheduleConfig(ScheduleConfig):
     """The same with longer first rounds, and with the steps of earlier rollouts beside the newest."""
-
-    ADDED: ClassVar[dict[str, Any]] = {"memory": 0}
 
     epochs: int = 5
     """Passes as long as a rollout in each round, over the newest rollouts and the memory."""
@@ -48,14 +54,12 @@ class ReplayedScheduleConfig(ScheduleConfig):
     negatives: int = 5
     """Rollouts that steps are drawn from, the newest included."""
     memory: int = 200_000
-    """Steps of older rollouts that are drawn from as well, a uniform sample of all; 0 keeps none. A reward
-    that is told of the newest policies alone forgets what was wrong with the ones before them, and pays a
-    fresh policy for it. They are in each checkpoint, too: 170 MB on Ant."""
+    """Steps of older rollouts that are drawn from as well, a uniform sample of all; 0 keeps none."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_at_least(self, 1, "negatives", "warmup_epochs")
-        check_at_least(self, 0, "warmup_rounds", "memory")
+        check_at_least(self, 0, "warmup_rounds")
 
 
 @runtime_checkable
@@ -117,8 +121,8 @@ class Adversarial:
         self.learner, self.discriminator = learner, discriminator
         self.expert, self.schedule, self.rng = expert, schedule, rng
         replayed = schedule if isinstance(schedule, ReplayedScheduleConfig) else None
-        rollouts, memory = (replayed.negatives, replayed.memory) if replayed else (1, 0)
-        self._negatives = Negatives(rollouts, rng, memory=memory, absorbing=absorbing)
+        rollouts = replayed.negatives if replayed else 1
+        self._negatives = Negatives(rollouts, rng, memory=schedule.memory, absorbing=absorbing)
         self.index = 0
         learner.start(discriminator.reward)
 

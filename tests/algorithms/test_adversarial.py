@@ -113,32 +113,45 @@ def test_a_round_reports_the_mean_over_all_its_minibatches() -> None:
     assert next(loop.rounds(30)).metrics["discriminator/loss"] == pytest.approx((3 + 4 + 5 + 6) / 4)
 
 
-def test_the_first_rounds_are_longer_and_earlier_rollouts_are_shown_again() -> None:
-    class Numbered(Told):
-        """Rollout i has i everywhere."""
+class Numbered(Told):
+    """Rollout i has i everywhere."""
 
-        def __init__(self) -> None:
-            super().__init__()
-            self.seen: list[set[float]] = []
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen: list[set[float]] = []
 
-        def collect(self) -> Transitions:
-            self.seen.append(set())
-            batch = super().collect()
-            return replace(batch, obs=torch.full_like(batch.obs, len(self.seen)))
+    def collect(self) -> Transitions:
+        self.seen.append(set())
+        batch = super().collect()
+        return replace(batch, obs=torch.full_like(batch.obs, len(self.seen)))
 
-        def update(self, expert: Transitions, policy: Transitions) -> Metrics:
-            self.seen[-1] |= set(policy.obs.flatten().tolist())
-            return super().update(expert, policy)
+    def update(self, expert: Transitions, policy: Transitions) -> Metrics:
+        self.seen[-1] |= set(policy.obs.flatten().tolist())
+        return super().update(expert, policy)
 
+
+def shown(schedule: ScheduleConfig) -> Numbered:
+    """What a discriminator is told in four rounds of this schedule."""
     told = Numbered()
-    schedule = ReplayedScheduleConfig(10, epochs=4, warmup_rounds=2, warmup_epochs=6, negatives=2, memory=0)
     expert = from_episodes(pointmass.demonstrations(2))
     loop = Adversarial(told, told, expert, schedule, torch_stream(0, "minibatches"))
     list(loop.rounds(4 * pointmass.STEPS))
+    return told
+
+
+def test_the_first_rounds_are_longer_and_earlier_rollouts_are_shown_again() -> None:
+    told = shown(ReplayedScheduleConfig(10, 4, warmup_rounds=2, warmup_epochs=6, negatives=2, memory=0))
     rounds = " ".join(told.calls).split("collect")[1:]
     # a pass is as long as a rollout, three minibatches, however many rollouts it draws from
     assert [said.count("update 10 10") for said in rounds] == [18, 18, 12, 12]
     assert told.seen == [{1.0}, {1.0, 2.0}, {2.0, 3.0}, {3.0, 4.0}]
+
+
+def test_a_memory_shows_every_earlier_rollout_again_in_passes_as_long() -> None:
+    told = shown(ScheduleConfig(10, epochs=8, memory=1000))
+    assert told.seen == [{1.0}, {1.0, 2.0}, {1.0, 2.0, 3.0}, {1.0, 2.0, 3.0, 4.0}]
+    assert told.calls.count("update 10 10") == 4 * 8 * 3
+    assert shown(ScheduleConfig(10, epochs=8)).seen == [{1.0}, {2.0}, {3.0}, {4.0}]
 
 
 def _gail(seed: int, trained: bool = True) -> Adversarial:

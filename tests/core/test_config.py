@@ -203,7 +203,7 @@ CHANGED = GAILRun(
     datasets_root=Path("data"),
     learner=PPO,
     discriminator=GAILConfig(hidden=(3, 4, 5), lr=1e-2, gradient_penalty=0.0),
-    schedule=ScheduleConfig(batch_size=16, epochs=3),
+    schedule=ScheduleConfig(batch_size=16, epochs=3, memory=100),
     watch=WATCH,
     device="cuda",
     threads=2,
