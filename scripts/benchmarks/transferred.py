@@ -104,7 +104,9 @@ def main(settings: Settings) -> None:
     for run in settings.runs:
         config = open_run(run).config
         reward = _reward(settings, config)
-        name = "-".join((reward, run.name.split("-", 1)[1], *settings.dynamics))
+        # a control's reward does not say the method, and DAC's learner has an absorbing state
+        whose = run.name if reward == HAND_WRITTEN else run.name.split("-", 1)[1]
+        name = "-".join((reward, whose, *settings.dynamics))
         file = settings.out / f"{name.replace('=', '-')}.json"
         if not file.is_file():
             file.parent.mkdir(parents=True, exist_ok=True)
