@@ -42,7 +42,6 @@ def test_a_control_is_by_the_same_learner_there() -> None:
     control = row | {"run": "gail-hopper-s1", "extra": f"--hand-written {truth.BONUS}"}
     assert truth.circumstances(row) == truth.circumstances(control)
     others = (
-        {"run": "dac-hopper-s1"},
         {"run": "airl-ant-s1"},
         {"env_steps": 18},
         {"seeds": [2]},

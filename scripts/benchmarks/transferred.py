@@ -104,7 +104,7 @@ def main(settings: Settings) -> None:
     for run in settings.runs:
         config = open_run(run).config
         reward = _reward(settings, config)
-        # a control's reward does not say the method, and DAC's learner has an absorbing state
+        # a control's reward does not say of which method's run it was
         whose = run.name if reward == HAND_WRITTEN else run.name.split("-", 1)[1]
         name = "-".join((reward, whose, *settings.dynamics))
         file = settings.out / f"{name.replace('=', '-')}.json"
