@@ -48,5 +48,9 @@ def test_a_control_is_by_the_same_learner_there() -> None:
         {"dynamics": "mass=2"},
         {"extra": "--hand-written"},
     )
+    found = {"method": "airl", "task": "Walker2d-v5", "seed": 1, "env_steps": 9, "reward": "airl"}
+    walked = {"run": "airl-walker2d-s1", "reward": "airl", "snapshot": 9, "extra": truth.BONUS}
+    assert truth.same(walked, found)
+    assert not truth.same(walked | {"extra": truth.SHORT}, found)
     for other in others:
         assert truth.circumstances(row) != truth.circumstances(control | other)
