@@ -75,8 +75,3 @@ def read(reward: RewardFn, batch: Transitions) -> Float[np.ndarray, "B"]:
     steps = replace(batch, terminated=torch.zeros_like(batch.terminated))
     with torch.no_grad():
         return reward(steps).double().cpu().numpy()
-
-
-def read_episodes(reward: RewardFn, episodes: Sequence[Episode]) -> list[Float[np.ndarray, "_"]]:
-    """The reward of each episode's steps."""
-    return [read(reward, from_episodes([episode])) for episode in episodes]

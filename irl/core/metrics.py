@@ -20,9 +20,10 @@ DECLARED: dict[str, tuple[str, str]] = {
     "return_mean": ("mean return of the last 20 training episodes, the environment's own reward", "reward"),
     "length_mean": ("mean length of the last 20 training episodes", "steps"),
     "eval_return_mean": ("mean return of the deterministic policy in its own episodes", "reward"),
+    "eval_return_stderr": ("its standard error over those episodes; 0 of a single one", "reward"),
     "eval_length_mean": ("mean length of those episodes", "steps"),
     "eval_learned_return_mean": (
-        "mean over the same episodes of the sum of the learned reward, without what s_abs pays",
+        "mean over the same episodes of the sum of the learned reward, counted from what s_abs pays",
         "reward",
     ),
     "reward/mean": ("mean of the reward given to the learner, before scaling", "reward"),

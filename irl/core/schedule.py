@@ -1,4 +1,4 @@
-"""Learning rates over a run."""
+"""Learning rates and other weights over a run."""
 
 from collections.abc import Callable
 from typing import Literal

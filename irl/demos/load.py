@@ -112,8 +112,9 @@ def check_task(demos: Demos, env: gym.Env, *, seen: bool = True) -> None:
     needs = (env.observation_space.shape or (0,))[0], (env.action_space.shape or (0,))[0]
     if has[1] == 0 and seen:
         raise UserError(
-            f"demonstrations {demos.dataset_id} have no actions, which the discriminator judges, or a "
-            f"policy is cloned from; without cloning let GAIL's or DAC's judge states or pairs of them: "
+            f"demonstrations {demos.dataset_id} have no actions, which the discriminator judges, a "
+            f"policy is cloned from, or a learner learns from (expert-share); without these let GAIL's or "
+            f"DAC's judge states or pairs of them: "
             f"--discriminator.inputs obs, or obs_next_obs"
         )
     if has[0] != needs[0] or has[1] not in (0, needs[1]):

@@ -108,6 +108,15 @@ def read(reward: Given, batch: Transitions, rows: int = 20_000) -> Float[np.ndar
     return np.concatenate(parts)
 
 
+def read_episodes(reward: Given, episodes: Sequence[Episode]) -> list[Float[np.ndarray, "_"]]:
+    """The reward of each episode's steps, as `read` has it, so that their sum is a return.
+
+    Without s_abs at 0 a sum says how long an episode was: a reward that pays each step less than nothing,
+    and what follows a termination less still, would be higher the sooner one falls.
+    """
+    return [read(reward, from_episodes([episode])) for episode in episodes]
+
+
 def plain(batch: Transitions) -> Transitions:
     """The batch without the hand-written reward and its terms, for a reward that must not read them."""
     return replace(batch, reward=None, terms={})

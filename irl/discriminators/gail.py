@@ -74,7 +74,8 @@ class GAILConfig(SwitchesConfig):
     inputs: Literal["obs_action", "obs", "obs_next_obs", "obs_action_next_obs"] = "obs_action"
     """What D judges a step by. `obs` and `obs_next_obs` learn from demonstrations without actions."""
     products: Literal["float32", "bfloat16"] = "float32"
-    """Number format of what hidden layers exchange while D learns. bfloat16 rounds to three digits."""
+    """Number format of what hidden layers exchange while D learns. bfloat16 rounds to three digits.
+    Where gradients are autograd's, as with spectral norm and with dropout, it is float32 regardless."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -33,7 +33,7 @@ def objective(
         share = regularisers.shares(len(expert), config.mixup, rng)
         row = share.unsqueeze(1)
         mixed = row * expert + (1.0 - row) * policy
-        return mixed, lambda logits: losses.mixed(logits, share, _mixed(share, *weights))
+        return mixed, lambda logits: losses.mixed(logits, share, _mixed(*weights))
     return torch.cat([expert, policy]), lambda logits: of_logits(
         config, logits[: len(expert)], logits[len(expert) :], weights
     )
@@ -52,8 +52,8 @@ def of_logits(
     return losses.bce(expert, policy, *weights)
 
 
-def _mixed(share: Tensor, expert: Weight, policy: Weight) -> Weight:
-    if expert is None and policy is None:
-        return None
-    one = torch.ones_like(share)
-    return share * (one if expert is None else expert) + (1.0 - share) * (one if policy is None else policy)
+def _mixed(expert: Weight, policy: Weight) -> Weight:
+    """Of a pair of independent draws: the product, as many times as each row stands for others."""
+    if expert is None or policy is None:
+        return policy if expert is None else expert
+    return expert * policy

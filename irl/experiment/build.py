@@ -19,13 +19,12 @@ from irl.core.types import Episode, RewardFn, Transitions, from_episodes
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.discriminators.dac import DAC, DACConfig
 from irl.discriminators.ensemble import Ensemble, one_or_several
-from irl.discriminators.gail import GAIL
+from irl.discriminators.gail import GAIL, GAILConfig
 from irl.envs.absorbing import subsample
 from irl.envs.discrete import OneHot
 from irl.envs.make import make as make_env
 from irl.envs.rollouts import random_act, rollouts
 from irl.experiment.configs import (
-    AIRLRun,
     BCRun,
     ExpertRun,
     FromDemonstrations,
@@ -80,6 +79,20 @@ def check_learner(kind: str, env: gym.Env) -> None:
         )
 
 
+def check_discriminator(of: GAILConfig | AIRLConfig, env: gym.Env) -> None:
+    """Refuse a discriminator for a task whose actions it cannot judge.
+
+    Raises:
+        UserError: it is AIRL's, and the task has a choice of actions.
+    """
+    if isinstance(of, AIRLConfig) and isinstance(env.action_space, OneHot):
+        wanted = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
+        raise UserError(
+            f"AIRL takes the density of actions that are real numbers off, {wanted} has a choice of "
+            f"{env.action_space.shape[0]}; learn with: irl train gail"
+        )
+
+
 def demonstrations(config: FromDemonstrations, episodes: Sequence[Episode]) -> Transitions:
     """The steps to learn from: thinned and led into the absorbing state where the settings say so."""
     rng = stream(config.seed, "demonstration steps")
@@ -99,8 +112,7 @@ def imitation(config: Imitation, episodes: Sequence[Episode]) -> Adversarial | I
     expert = expert.to(config.device)
     if isinstance(config, OffPolicyRun):
         return Interleaved(learner, discriminator, expert, config.schedule, rng)
-    absorbing = isinstance(config, AIRLRun) and scale > 0
-    return Adversarial(learner, discriminator, expert, config.schedule, rng, absorbing=absorbing)
+    return Adversarial(learner, discriminator, expert, config.schedule, rng, absorbing=scale > 0)
 
 
 def _normaliser(config: Imitation, expert: Transitions) -> Normaliser:

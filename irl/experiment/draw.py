@@ -13,8 +13,8 @@ from irl.discriminators.airl import AIRLConfig
 from irl.envs.flatten import OBS_KEYS
 from irl.envs.make import check_module, make
 from irl.envs.names import split_name
-from irl.experiment.build import check_learner
-from irl.experiment.configs import BCRun, FromDemonstrations
+from irl.experiment.build import check_discriminator, check_learner
+from irl.experiment.configs import BCRun, FromDemonstrations, OffPolicyRun
 from irl.experiment.judge import finite
 
 RECORD = "demonstrations.json"
@@ -35,6 +35,8 @@ def _drawn_of(config: FromDemonstrations, root: Path | None) -> Demos:
     try:
         demos = _loaded(config, root)
         check_learner(config.learner.KIND, env)
+        if not isinstance(config, BCRun):
+            check_discriminator(config.discriminator, env)
         check_task(demos, env, seen=_sees_actions(config))
         env.reset(seed=config.seed)
         box = env.action_space
@@ -49,6 +51,9 @@ def _drawn_of(config: FromDemonstrations, root: Path | None) -> Demos:
 def _sees_actions(config: FromDemonstrations) -> bool:
     """Whether it learns from the actions of the demonstrations, and not from their states alone."""
     if isinstance(config, BCRun) or config.warm_start.updates:
+        return True
+    if isinstance(config, OffPolicyRun) and config.schedule.expert_share:
+        # they stand beside the learner's own, in one batch
         return True
     # AIRL takes the density of the actions off, whatever g sees
     return "action" in config.discriminator.inputs or isinstance(config.discriminator, AIRLConfig)

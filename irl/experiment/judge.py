@@ -9,12 +9,13 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from irl.algorithms.probe import STRATA, Probe, read, read_episodes
+from irl.algorithms.probe import STRATA, Probe, read
 from irl.core import statistics
 from irl.core.rng import stream
 from irl.diagnostics.agreement import per_episode, per_step
 from irl.diagnostics.drift import split
 from irl.diagnostics.stack import read as read_anchored
+from irl.diagnostics.stack import read_episodes
 from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
 

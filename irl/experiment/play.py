@@ -16,7 +16,6 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from irl.algorithms.loop import Round
-from irl.algorithms.probe import read_episodes
 from irl.core.differences import differences, without
 from irl.core.errors import UserError
 from irl.core.finite import NotFinite
@@ -25,6 +24,8 @@ from irl.core.metrics import Row
 from irl.core.records import RunFolder, snapshot_steps
 from irl.core.rng import episode_seeds
 from irl.core.types import Metrics, RewardFn
+from irl.diagnostics.overoptimisation import standard_errors
+from irl.diagnostics.stack import read_episodes
 from irl.envs.rollouts import rollouts
 from irl.experiment.curves import curves
 from irl.experiment.imitation_run import Watch
@@ -36,6 +37,9 @@ MOST_CHECKPOINTING = 0.02
 
 MAY_CHANGE = ("watch", "out", "datasets_root", "run")
 """Settings that change no weight, places among them: they may be others when a run goes on."""
+
+EVALUATION = "evaluation while training"
+"""The stream of its episodes' starts."""
 
 RECENT = 20
 """Training episodes that `return_mean` is the mean of."""
@@ -87,7 +91,7 @@ class Player:
         """`snapshot` fills the folder it is given. With `reward`, evaluations are judged by that as well."""
         self.algorithm, self.folder, self.watch = algorithm, folder, watch
         self.env_id, self.steps, self.snapshot, self.reward = env_id, steps, snapshot, reward
-        self._eval_seeds = episode_seeds(seed, "evaluation while training", watch.eval_episodes)
+        self._eval_seeds = episode_seeds(seed, EVALUATION, watch.eval_episodes)
         self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
         self._wall_s = self._checkpoint_s = self._last_save_s = 0.0
 
@@ -199,8 +203,10 @@ class Player:
         if self.watch.eval_episodes == 0 or not (last or (every and round_.index % every == 0)):
             return {}
         episodes = rollouts(self.env_id, self.algorithm.learner.policy(), self._eval_seeds)
+        returns = np.array([episode.return_ for episode in episodes])
         seen = {
-            "eval_return_mean": float(np.mean([episode.return_ for episode in episodes])),
+            "eval_return_mean": float(returns.mean()),
+            "eval_return_stderr": float(standard_errors([returns])[0]),
             "eval_length_mean": float(np.mean([len(episode) for episode in episodes])),
         }
         if self.reward is not None:

@@ -27,7 +27,7 @@ from irl.experiment.configs import Imitation, RetrainRun
 from irl.experiment.judge import finite
 from irl.experiment.play import MAY_CHANGE
 from irl.experiment.progress import each_episode, progress
-from irl.experiment.retrain import Retrain, retrain_one, settled
+from irl.experiment.retrain import LEARNERS, Retrain, retrain_one, settled
 from irl.experiment.retrained import EPISODES, RESULT
 from irl.experiment.snapshots import snapshot_of
 from irl.policies import shelf
@@ -36,7 +36,7 @@ from irl.policies.policy import load_policy
 
 GATHERED, FORMAT, VERSION = "retrained.json", "irl.retrained", 1
 UNCHANGED, HAND_WRITTEN = "as trained", "hand-written"
-KEY = ("snapshot", "part", "env_id", "algorithm", "env_steps")
+KEY = ("snapshot", "part", "env_id", "algorithm", "env_steps", "settings")
 """What two retrainings have in common that are seeds of one row."""
 
 
@@ -99,7 +99,8 @@ def _rows(path: Path) -> list[dict[str, Any]]:
     content = files.read_json(path)
     known = isinstance(content, dict) and (content.get("format"), content.get("version")) == (FORMAT, VERSION)
     rows = content.get("rows") if known else None
-    wanted = {*KEY, "seeds", "episode_returns"}
+    # settings have come later: a row without them is of nobody knows which, and no seed is added to it
+    wanted = {*KEY, "seeds", "episode_returns"} - {"settings"}
     if not isinstance(rows, list) or not all(isinstance(r, dict) and wanted <= set(r) for r in rows):
         raise UserError(f"{path} is not a file that irl retrain --seeds writes; move it out of the way")
     return rows
@@ -112,6 +113,8 @@ def _result(config: RetrainRun) -> dict[str, Any]:
         found["reward"] = {name: content["reward"][name] for name in ("env_steps", "reward_map")}
         found["reward"]["average_over"] = dict(content["reward"].get("average_over", {}))
         found["reward"]["hand_written"] = bool(content["reward"].get("hand_written"))
+        found |= {"settings": {**to_json(config.learner), "entropy": config.entropy}}
+        found |= {"changed": _changed(config)}
         return found | {name: content[name] for name in ("algorithm", "env_steps")}
     except (LookupError, TypeError, ValueError) as error:
         raise UserError(
@@ -120,7 +123,14 @@ def _result(config: RetrainRun) -> dict[str, Any]:
 
 
 def _is_same(old: Mapping[str, Any], row: Mapping[str, Any]) -> bool:
-    return all(old[key] == row[key] for key in KEY)
+    return all(old.get(key) == row[key] for key in KEY)
+
+
+def _changed(config: RetrainRun) -> str:
+    """The learner's settings that are not its defaults, in words."""
+    given, usual = to_json(config.learner), to_json(LEARNERS[config.learner.KIND])
+    words = [f"{name} {value}" for name, value in given.items() if value != usual[name]]
+    return ", ".join(words + [f"entropy {config.entropy}"] * bool(config.entropy))
 
 
 def _one_of(command: Retrain, its: Any, step: int, seed: int) -> Retrain:
@@ -165,6 +175,8 @@ def _empty_row(result: Mapping[str, Any], learned: str, trained: str) -> dict[st
         "env_id": trained,
         "algorithm": result["algorithm"],
         "env_steps": result["env_steps"],
+        "settings": result["settings"],
+        "changed": result["changed"],
     }
 
 
@@ -207,4 +219,5 @@ def _said(row: Mapping[str, Any]) -> str:
             shown += f" ({ratio['low']:.2f} to {ratio['high']:.2f})"
     returns = " ".join("-" if value is None else f"{value:.1f}" for value in row["returns"])
     where = f"{row['part']} of step {row['snapshot']:,}, {row['dynamics']}"
+    where += f", {row['changed']}" if row["changed"] else ""
     return f"{where}: {shown}; returns {returns} of seeds {' '.join(map(str, row['seeds']))}"

@@ -37,6 +37,8 @@ from irl.policies.policy import save_policy
 Seeds = Annotated[tuple[int, ...], tyro.conf.arg(metavar="SEED ...")]
 SEED_APART = 1000
 """The seed is that of the run and this, unless one is typed: no stream of the run is used again."""
+LEARNERS = {settings.KIND: settings for settings in (PPOConfig(), OFF_POLICY, OFF_POLICY_TD3)}
+"""The settings of each learner unless others are typed."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,7 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
     """
     assert command.run is not None
     algo = command.algo or its.learner.KIND
-    for name, default in (("ppo", PPOConfig()), ("sac", OFF_POLICY), ("td3", OFF_POLICY_TD3)):
+    for name, default in LEARNERS.items():
         if name != algo and getattr(command, name) != default:
             raise UserError(f"--{name}.* are settings of a learner that is not used; choose --algo {name}")
     if command.entropy and algo != PPOConfig.KIND:

@@ -10,16 +10,18 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from irl.algorithms.probe import read_episodes
 from irl.core import files
 from irl.core.records import RunFolder
 from irl.core.rng import episode_seeds
 from irl.core.types import Episode
+from irl.diagnostics.overoptimisation import standard_errors
+from irl.diagnostics.stack import read_episodes
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import RetrainRun
 from irl.experiment.frozen import RECORD
 from irl.experiment.judge import finite
 from irl.experiment.overoptimised import over_run
+from irl.experiment.play import EVALUATION
 from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 from irl.policies.card import Card, normalised_score, summary
@@ -41,6 +43,7 @@ def report(config: RetrainRun, folder: RunFolder, reward: LearnedReward, policie
     seeds = episode_seeds(config.seed, "retrained", EPISODES)
     with progress(f"measuring {config.env_id}", EPISODES, show=config.watch.progress) as done:
         episodes = rollouts(config.env_id, policy, seeds, each_episode(done))
+    card = shelf.expert_card(config.env_id, policies_root)
     result = {
         "format": "irl.retrain",
         "version": 1,
@@ -49,9 +52,9 @@ def report(config: RetrainRun, folder: RunFolder, reward: LearnedReward, policie
         "algorithm": config.learner.KIND,
         "seed": config.seed,
         "env_steps": steps,
-        "true": _true(episodes, shelf.expert_card(config.env_id, policies_root)),
+        "true": _true(episodes, card),
         "learned": _learned(reward, episodes),
-        "proxy_gold": _over_training(folder),
+        "proxy_gold": _over_training(config, folder, reward, card.random_return_mean if card else None),
         "episodes": EPISODES,
         "episode_seeds": seeds,
     }
@@ -59,13 +62,29 @@ def report(config: RetrainRun, folder: RunFolder, reward: LearnedReward, policie
     Console().print(_table(result))
 
 
-def _over_training(folder: RunFolder) -> dict[str, Any]:
-    """Both returns at the evaluations while it trained: here the proxy is one reward all along."""
-    names = ("env_steps", "eval_learned_return_mean", "eval_return_mean")
-    rows = [[row.get(name) for name in names] for row in folder.metrics()]
+def _over_training(
+    config: RetrainRun, folder: RunFolder, reward: LearnedReward, floor: float | None
+) -> dict[str, Any]:
+    """Both returns from random weights on, at the evaluations: here the proxy is one reward all along."""
+    names = ("env_steps", "eval_learned_return_mean", "eval_return_mean", "eval_return_stderr")
+    rows = [tuple(row.get(name) for name in names) for row in folder.metrics()]
     known = [row for row in rows if None not in row]
-    steps, proxy, gold = zip(*known, strict=True) if known else ((), (), ())
-    return over_run(steps, proxy, gold)[0]
+    if known:
+        known.insert(0, _at_first(config, folder, reward))
+    steps, proxy, gold, error = zip(*known, strict=True) if known else ((), (), (), ())
+    return over_run(steps, proxy, gold, np.array(error, float), floor=floor)[0]
+
+
+def _at_first(
+    config: RetrainRun, folder: RunFolder, reward: LearnedReward
+) -> tuple[int, float, float, float]:
+    """The same numbers of the policy that nothing had taught yet, in the episodes of the evaluations."""
+    steps, first = next(iter(folder.snapshots().items()))
+    seeds = episode_seeds(config.seed, EVALUATION, config.watch.eval_episodes)
+    episodes = rollouts(config.env_id, load_policy(first / "policy.safetensors"), seeds)
+    returns = np.array([episode.return_ for episode in episodes])
+    learned = float(np.mean([given.sum() for given in read_episodes(reward, episodes)]))
+    return steps, learned, float(returns.mean()), float(standard_errors([returns])[0])
 
 
 def _true(episodes: Sequence[Episode], card: Card | None) -> dict[str, Any]:
@@ -88,11 +107,7 @@ def _true(episodes: Sequence[Episode], card: Card | None) -> dict[str, Any]:
 
 
 def _learned(reward: LearnedReward, episodes: Sequence[Episode]) -> dict[str, Any]:
-    """Returns by the learned reward: sums over an episode's steps, undiscounted.
-
-    What the absorbing state pays after a termination is left out, as everywhere in an evaluation
-    (`irl.algorithms.probe.read`); a learner is paid it.
-    """
+    """Returns by the learned reward: undiscounted sums of what the steps pay above the absorbing state."""
     returns = np.array([float(given.sum()) for given in read_episodes(reward, episodes)])
     return {
         "return_mean": finite(float(returns.mean())),

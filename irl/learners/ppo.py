@@ -25,7 +25,7 @@ from torch import Tensor, nn
 from irl.core.config import check_at_least
 from irl.core.finite import check_finite, named
 from irl.core.nets import ACTIVATIONS, Normaliser
-from irl.core.schedule import learning_rate
+from irl.core.schedule import learning_rate, rate_at
 from irl.core.types import Metrics, RewardFn
 from irl.envs.discrete import OneHot
 from irl.learners.adopting import adopt
@@ -210,7 +210,7 @@ class PPOLearner(Rollouts):
         model._update_current_progress_remaining(self.env_steps, self.total_steps)
         remaining = model._current_progress_remaining
         c = self.config
-        model.ent_coef = c.ent_coef * (remaining if c.ent_schedule == "linear" else 1.0)
+        model.ent_coef = rate_at(c.ent_coef, c.ent_schedule, remaining)
         metrics = self._update(model.lr_schedule(remaining), c.clip_range, c.clip_range_vf)
         check_finite(named("policy", model.policy.state_dict()))
         return metrics

@@ -111,7 +111,9 @@ class SACLearner(OffPolicyLearner[SACConfig, SAC, SACUpdate]):
             assert isinstance(net, nn.Sequential)
             assert isinstance(following, nn.Sequential)
             if outputs > 1:
-                net[-1] = linear(self.config.hidden[-1], outputs, rng).to(self.model.device)
+                of = net[-1]
+                assert isinstance(of, nn.Linear)
+                net[-1] = linear(of.in_features, outputs, rng).to(self.model.device)
                 following[-1] = copy.deepcopy(net[-1])
 
     def _explore(self, features: Float[Tensor, "B F"]) -> Float[Tensor, "B A"]:

@@ -68,6 +68,7 @@ def cell(settings: Settings, task: str, seed: int) -> dict[str, Any]:
     demonstrations(task, root)
     run = settings.runs / f"{settings.method}-{task_name(task)}-s{seed}"
     if (run / "config.json").is_file():
+        check_same(settings, seed, run)
         irl("train", "--resume", str(run))
     else:
         words = (
@@ -84,6 +85,17 @@ def cell(settings: Settings, task: str, seed: int) -> dict[str, Any]:
         irl("train", settings.method, *words, *where, *shlex.split(settings.extra))
     irl("evaluate", str(run))
     return result(settings, task, seed, run)
+
+
+def check_same(settings: Settings, seed: int, run: Path) -> None:
+    """Stop where a run folder that is there is of another cell than the one that is asked for."""
+    config = json.loads((run / "config.json").read_text())
+    command = json.loads((run / "environment.json").read_text())["command"]
+    asked, has = {"seed": seed, "steps": settings.steps}, {name: config[name] for name in ("seed", "steps")}
+    if asked != has or not set(shlex.split(settings.extra)) <= set(shlex.split(command)):
+        raise SystemExit(
+            f"{run} was begun by `{command}`; {asked} {settings.extra} is another cell: choose another --runs"
+        )
 
 
 def result(settings: Settings, task: str, seed: int, run: Path) -> dict[str, Any]:

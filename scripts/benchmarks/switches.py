@@ -94,7 +94,10 @@ def cell(settings: Settings, method: str, task: str, switch: str) -> dict[str, A
     methods.demonstrations(task, root)
     run = settings.runs / f"{method}-{task_name(task)}-{switch}"
     steps, words = settings.steps or STEPS[method], cells(method)[switch]
+    extra = f"{words} {settings.extra}".strip()
+    asked = methods.Settings(method, (task,), (settings.seed,), steps, extra)  # pyright: ignore[reportArgumentType]
     if (run / "config.json").is_file():
+        methods.check_same(asked, settings.seed, run)
         methods.irl("train", "--resume", str(run))
     else:
         given = (
@@ -110,7 +113,6 @@ def cell(settings: Settings, method: str, task: str, switch: str) -> dict[str, A
         where = ("--out", str(run), "--datasets-root", str(root))
         methods.irl("train", method, *given, *where, *shlex.split(words), *shlex.split(settings.extra))
     methods.irl("evaluate", str(run))
-    asked = methods.Settings(method, (task,), (settings.seed,), steps, f"{words} {settings.extra}".strip())  # pyright: ignore[reportArgumentType]
     return {"switch": switch, **methods.result(asked, task, settings.seed, run)}
 
 
@@ -141,7 +143,12 @@ def main(settings: Settings) -> None:
     ]
     for method, task, switch in todo:
         file = settings.out / method / task_name(task) / f"{switch}.json"
-        if not file.is_file():
+        if file.is_file():
+            if (seed := json.loads(file.read_text())["seed"]) != settings.seed:
+                raise SystemExit(
+                    f"{file} is of seed {seed}; choose another --out and --runs for {settings.seed}"
+                )
+        else:
             row = cell(settings, method, task, switch)
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(json.dumps(row, indent=1) + "\n")

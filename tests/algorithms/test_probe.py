@@ -1,15 +1,10 @@
 """The probe: equal parts, whole episodes, the same every time."""
 
-import numpy as np
 import torch
 
-from irl.algorithms.probe import STRATA, probe, random_episodes, read, read_episodes
-from irl.core.types import Transitions, from_episodes
+from irl.algorithms.probe import STRATA, probe, random_episodes
+from irl.core.types import from_episodes
 from tests import pointmass
-
-
-def total(batch: Transitions) -> torch.Tensor:
-    return batch.obs.sum(dim=1)
 
 
 def test_every_stratum_has_the_same_number_of_steps_from_its_own_episodes() -> None:
@@ -39,10 +34,3 @@ def test_random_episodes_are_whole_and_enough() -> None:
 
 def test_a_small_probe_still_has_its_random_episodes() -> None:
     assert len(random_episodes("PointMass-v0", 3, seed=0)) == 20
-
-
-def test_reading_follows_the_episodes() -> None:
-    episodes = pointmass.demonstrations(2)
-    per_episode = read_episodes(total, episodes)
-    np.testing.assert_allclose(np.concatenate(per_episode), read(total, from_episodes(episodes)))
-    assert [len(values) for values in per_episode] == [len(episode) for episode in episodes]

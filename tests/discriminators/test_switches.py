@@ -12,7 +12,7 @@ from torch import Tensor
 
 from irl.core.nets import Normaliser
 from irl.core.types import Transitions
-from irl.discriminators import losses, regularisers
+from irl.discriminators import losses, objectives, regularisers
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.discriminators.dac import DAC, DACConfig
 from irl.discriminators.ensemble import Ensemble, one_or_several
@@ -183,6 +183,17 @@ def test_losses_of_a_blind_discriminator_and_weights_as_rows() -> None:
     # a sure D: the negatives' risk would be below 0, and is not rewarded
     sure = losses.positive_unlabelled(torch.full((3,), 9.0), torch.full((3,), -9.0), 0.5)
     assert float(sure) == pytest.approx(0.5 * math.log1p(math.exp(-9.0)), rel=1e-4)
+
+
+def test_mixup_of_rows_that_stand_for_others_is_that_of_as_many_rows() -> None:
+    # identical sides, one of half the rows at .05: blind is best, so the loss has no slope there
+    n, settings = 40_000, config("gail", "mixup")
+    h = torch.zeros(1, requires_grad=True)
+    weight = torch.where(torch.arange(n) % 2 == 0, 1.0, 0.05)
+    rows, rng = torch.zeros(n, 1), torch.Generator().manual_seed(0)
+    inputs, loss = objectives.objective(settings, rows, rows, (weight, None), rng)
+    loss(h.expand(len(inputs))).backward()
+    assert float(h.grad) == pytest.approx(0.0, abs=0.02)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.3, 1.0])

@@ -109,6 +109,19 @@ def test_sac_is_refused_where_actions_are_a_choice(irl: Command, capfd: pytest.C
         assert not Path("refused").exists()
 
 
+def test_airl_is_refused_where_actions_are_a_choice(irl: Command, capfd: pytest.CaptureFixture) -> None:
+    cartpole(irl, 1)
+    demos = "--demos irl/cartpole/imported-v0 --demo-episodes 1 --datasets-root ds"
+    with pytest.raises(SystemExit):
+        irl(*f"train airl --env-id CartPole-v1 {demos}".split(), "--out", "refused")
+    said = capfd.readouterr().err
+    assert (
+        "AIRL takes the density of actions that are real numbers off, CartPole-v1 has a choice of 2" in said
+    )
+    assert said.count("\n") == 1
+    assert not Path("refused").exists()
+
+
 THEIRS = """
 import gymnasium as gym
 from tests.pointmass import PointMass
@@ -175,6 +188,11 @@ def test_demonstrations_without_actions(inputs: str, irl: Command, capfd: pytest
             "train", "airl", *words[2:], "--demo-episodes=3", "--discriminator.inputs=obs", "--out", "refused"
         )
     assert "have no actions" in capfd.readouterr().err
+    seen = (f"--discriminator.inputs={inputs}", "--schedule.expert-share=0.25", "--out=refused")
+    with pytest.raises(SystemExit):
+        # a learner of states and actions learns from them too
+        irl("train", "gail-sac", *words[2:8], "--demo-episodes=3", "--steps=100", *seen)
+    assert "(expert-share)" in capfd.readouterr().err
     irl(*words, "--demo-episodes=3", "--discriminator.inputs", inputs, "--out", "run")
     irl("evaluate", "run", *LOOK)
     found = json.loads(Path("run/evaluation.json").read_text())

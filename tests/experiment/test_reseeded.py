@@ -65,7 +65,27 @@ def test_another_task_is_another_row_and_the_proxy_is_followed(irl: Command) -> 
     assert there["scores"] == [None]
     assert here["ratio"]["low"] is None
     points = files.read_json(Path("runs/retrain-gail-768-ppo-s7/retrain.json"))["proxy_gold"]["points"]
-    assert [point["step"] for point in points] == [128, 256]
+    assert [point["step"] for point in points] == [0, 128, 256]
+
+
+@pytest.mark.usefixtures("runs")
+def test_another_learner_is_another_row_and_says_so(irl: Command, capsys: pytest.CaptureFixture) -> None:
+    irl("retrain", "gail", "--seeds", "7", *SHORT)
+    (before,) = rows()
+    irl("retrain", "gail", "--seeds", "8", "--ppo.lr=0.001", "--entropy=0.5", "--out", "other", *SHORT)
+    kept, other = rows()
+    assert kept == before
+    assert (kept["seeds"], other["seeds"]) == ([7], [8])
+    assert other["settings"]["lr"] == 0.001
+    assert "lr 0.001" in other["changed"]
+    assert "entropy 0.5" in capsys.readouterr().out
+    # one of before there were settings in a row
+    del kept["settings"]
+    files.write_json(Path("gail/retrained.json"), {"format": "irl.retrained", "version": 1, "rows": [kept]})
+    irl("retrain", "gail", "--seeds", "7", *SHORT)
+    old, new = rows()
+    assert old == kept
+    assert new == before
 
 
 def test_the_dynamics_are_part_of_the_tasks_name() -> None:

@@ -10,11 +10,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from irl.algorithms.probe import read_episodes
 from irl.core import files
 from irl.core.config import from_json, to_json
 from irl.core.records import open_run
 from irl.core.types import Transitions
+from irl.diagnostics.stack import read_episodes
 from irl.envs.rollouts import rollouts
 from irl.experiment import build, play
 from irl.experiment.cli import main
@@ -121,6 +121,12 @@ def test_it_reports_the_true_return_beside_the_learned_one(
     assert rows
     # GAIL pays for each step, the point mass never does
     assert all(row["eval_learned_return_mean"] > 0.0 > row["eval_return_mean"] for row in rows)
+    first, *later = result["proxy_gold"]["points"]
+    assert [point["gold"] for point in later] == [row["eval_return_mean"] for row in rows]
+    assert [point["gold_error"] for point in later] == [row["eval_return_stderr"] for row in rows]
+    assert first["step"] == 0
+    assert first["proxy"] > 0.0 > first["gold"]
+    assert all(point["gold_error"] > 0.0 for point in (first, *later))
 
 
 @pytest.mark.usefixtures("runs")

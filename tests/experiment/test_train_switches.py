@@ -1,7 +1,7 @@
 """Switches from the command line to a saved reward that is read and judged."""
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +13,20 @@ from irl.algorithms.interleaved import InterleavedConfig
 from irl.core import files
 from irl.core.records import open_run
 from irl.core.rng import episode_seeds
-from irl.core.types import from_episodes
+from irl.core.types import Transitions, from_episodes
 from irl.demos.load import load_demos
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
-from irl.discriminators.gail import GAILConfig
+from irl.discriminators.gail import GAIL, GAILConfig
 from irl.envs.make import make
 from irl.envs.rollouts import random_act, rollouts
+from irl.experiment import build
+from irl.experiment.configs import GAILRun
+from irl.learners.ppo import PPOConfig
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
 from irl.rewards.ensemble import EnsembleNet
+from tests import pointmass
 from tests.experiment.conftest import DATASET, LOOK, QUICK, TASK
 
 Command = Callable[..., None]
@@ -63,6 +67,27 @@ def test_whole_steps_are_judged_and_the_settings_are_written_down(irl: Command) 
     moved = type(batch)(other.obs, other.action, other.next_obs + 1.0, other.terminated, other.truncated)
     assert not torch.allclose(reward(batch), reward(moved))
     assert files.read_json(Path("run/config.json"))["discriminator"]["mixup"] == 0.5
+
+
+@pytest.mark.parametrize("scale", [0.0, 10.0])
+def test_gail_sees_the_policy_in_the_absorbing_state_where_it_knows_one(
+    monkeypatch: pytest.MonkeyPatch, scale: float
+) -> None:
+    shown: list[Transitions] = []
+
+    def noted(self: GAIL, expert: Transitions, policy: Transitions) -> dict[str, float]:
+        shown.append(policy)
+        return update(self, expert, policy)
+
+    update = GAIL.update
+    monkeypatch.setattr(GAIL, "update", noted)
+    learner = PPOConfig(n_envs=2, steps_per_round=128, batch_size=64, hidden=(8,))
+    # a task in which it soon falls
+    config = GAILRun(env_id='PointMass-v0?{"cliff":0.05}', steps=128, learner=learner)
+    config = replace(config, discriminator=GAILConfig(hidden=(8,), absorbing_scale=scale))
+    list(build.imitation(config, pointmass.demonstrations(2)).rounds(128))
+    there = sum(int(batch.absorbing.sum()) for batch in shown if batch.absorbing is not None)
+    assert (there > 0) == (scale > 0)
 
 
 def test_what_is_refused_is_one_line_with_the_reason(irl: Command, capsys: pytest.CaptureFixture) -> None:

@@ -159,6 +159,14 @@ def test_a_linear_bonus_is_what_is_left_of_it() -> None:
     assert not torch.equal(a_quarter_gone["log_std"], whole["log_std"])
 
 
+def test_a_round_past_the_runs_end_is_not_fined_for_entropy() -> None:
+    ours = learner(config=replace(SMALL, ent_coef=0.4, ent_schedule="linear"), total_steps=100)
+    ours.collect()
+    ours.improve(position)
+    assert ours.env_steps > 100
+    assert ours.model.ent_coef == 0.0
+
+
 def test_improving_twice_on_one_rollout_is_refused() -> None:
     ours = learner()
     ours.collect()

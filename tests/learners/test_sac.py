@@ -156,6 +156,11 @@ def test_target_critics_follow_at_every_third_update_only() -> None:
     assert moved == [False, False, True] * 2
 
 
+def test_a_learner_without_hidden_layers_has_quantiles_too() -> None:
+    ours = learner(config=replace(SMALL, hidden=(), quantiles=5))
+    assert [linear_layers(net)[-1].out_features for net in ours.model.critic.q_networks] == [5, 5]
+
+
 def test_more_critics_and_their_quantiles_are_outputs_of_the_models_own() -> None:
     ours = trained(n_critics=3, quantiles=7, dropped_quantiles=1)
     critic, target = ours.model.critic, ours.model.critic_target

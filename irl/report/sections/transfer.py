@@ -43,6 +43,7 @@ def _row(row: Mapping[str, Any]) -> tuple[Cell, ...]:
     known = [value for value in scores if value is not None]
     seeds = row.get("seeds")
     part = f", {row['part']}" if row.get("part") else ""
+    part += f"; {row['changed']}" if row.get("changed") else ""
     dynamics = row.get("dynamics")
     return (
         f"step {row.get('snapshot')}{part}",
