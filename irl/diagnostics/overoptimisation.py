@@ -67,8 +67,8 @@ class Overoptimisation:
     lost: float
     """The same of what lies above a floor: a first policy that happens to be good makes any gain small."""
     gap: float
-    proxy_rose: bool
-    """Whether the proxy at the end is above that at the peak of gold."""
+    proxy_rose: bool | None
+    """Whether the proxy at the end is above that at the peak of gold; None where errors do not say."""
     decoupling: int | None
     """The point where the first window begins; None where none does."""
     fit: Fit | None
@@ -82,6 +82,7 @@ def overoptimisation(
     gold: Points,
     error: Points | None = None,
     floor: float | None = None,
+    proxy_error: Points | None = None,
 ) -> Overoptimisation:
     """Peak, drop, gap, decoupling and fit of a curve.
 
@@ -89,12 +90,14 @@ def overoptimisation(
         steps: rising; the first is what the others are held against.
         error: standard error of each gold return; none unless given.
         floor: gold return of random actions; that of the first point unless given.
+        proxy_error: standard error of each proxy return; none unless given.
     Raises:
         ValueError: there are fewer than two points, or a return is not finite.
     """
     if len(steps) < 2 or not (np.isfinite(proxy).all() and np.isfinite(gold).all()):
         raise ValueError(f"proxy and gold of {len(steps)} points; two or more finite ones are needed")
     error = np.zeros(len(gold)) if error is None else error
+    proxy_error = np.zeros(len(gold)) if proxy_error is None else proxy_error
     peak = int(np.argmax(gold))
     fit, reason = fitted(steps, gold)
     return Overoptimisation(
@@ -102,11 +105,17 @@ def overoptimisation(
         drop=_lost(gold, error, peak, float(gold[0])),
         lost=_lost(gold, error, peak, float(gold[0]) if floor is None else floor),
         gap=_z(proxy) - _z(gold),
-        proxy_rose=bool(proxy[-1] > proxy[peak]),
+        proxy_rose=_rose(proxy, proxy_error, peak),
         decoupling=decoupling(proxy, gold, error),
         fit=fit,
         fit_reason=reason,
     )
+
+
+def _rose(proxy: Points, error: Points, peak: int) -> bool | None:
+    """Whether the end is above the proxy at gold's peak; None where their errors do not say."""
+    change = float(proxy[-1] - proxy[peak])
+    return change > 0 if abs(change) > SURE * math.hypot(error[peak], error[-1]) else None
 
 
 def _lost(gold: Points, error: Points, peak: int, floor: float) -> float:

@@ -126,8 +126,8 @@ def names_of(episodes: Sequence[Episode], learned: Sequence[np.ndarray]) -> list
     """The terms that every episode has recorded.
 
     Raises:
-        ValueError: there are fewer than two episodes or no such term, or the learned reward is of other steps
-            or not finite.
+        ValueError: there are fewer than two episodes or no such term, a term is not finite, or the learned
+            reward is of other steps, constant or not finite.
     """
     if len(episodes) < 2:
         raise ValueError(f"weights and their intervals need two episodes or more, not {len(episodes)}")
@@ -136,9 +136,13 @@ def names_of(episodes: Sequence[Episode], learned: Sequence[np.ndarray]) -> list
         raise ValueError(f"expected a learned reward for each step: lengths {ours} != {theirs}")
     if not all(np.isfinite(r).all() for r in learned):
         raise ValueError("the learned reward is not finite everywhere")
+    if is_constant(np.concatenate(learned)):
+        raise ValueError("the learned reward is constant: no term has a part in it")
     names = [name for name in episodes[0].terms if all(name in episode.terms for episode in episodes)]
     if not names:
         raise ValueError("these episodes have no term of the hand-written reward in common")
+    if broken := [name for name in names if not np.isfinite(column_of(episodes, name)).all()]:
+        raise ValueError(f"recorded terms are not finite everywhere: {', '.join(broken)}")
     return names
 
 

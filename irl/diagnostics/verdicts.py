@@ -90,7 +90,7 @@ RULES: tuple[Rule, ...] = (
         "fell with it, is above the threshold",
         "The policy has lost most of what it had learned, and the reward saw it: the training fell over, and "
         "an earlier snapshot is better.",
-        "The policy kept what it had learned.",
+        "The policy has not lost that much while the learned return fell.",
     ),
     Rule(
         "saturated",
@@ -105,8 +105,8 @@ RULES: tuple[Rule, ...] = (
         "survival-biased",
         0.8,
         True,
-        "|mean| / (|mean| + deviation) of the reward over the probe, where episodes can end early, is above "
-        "the threshold",
+        "|mean| / (|mean| + deviation) of the reward over the probe, where episodes can end early and "
+        "the hand-written reward is below the threshold, is above it",
         "Going on, or ending, pays more than how: a policy may learn to do no more than that.",
         "How a step is done pays, beside that it is done.",
     ),
@@ -127,7 +127,7 @@ RULES: tuple[Rule, ...] = (
         "share of its true return above random actions that the policy lost again, where the learned return "
         "rose meanwhile, is above the threshold",
         "The policy gets more of the learned reward and less of the true one: the reward is being exploited.",
-        "The true return did not fall while the learned one rose.",
+        "The true return did not fall that much while the learned one rose.",
     ),
 )
 """Every verdict there is."""

@@ -24,7 +24,7 @@ import json
 import os
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -74,7 +74,11 @@ def changed_model(env_id: str, changes: object) -> Iterator[dict[str, Any]]:
 
 
 def change(root: ET.Element, changes: Mapping[str, float]) -> None:
-    """Change a parsed model in place."""
+    """Change a parsed model in place.
+
+    Raises:
+        UserError: its gravity or damping is 0, so a factor changes nothing.
+    """
     for name, factor in changes.items():
         if name == "mass":
             _scale(root, "geom", "density", 1000.0, factor)
@@ -86,13 +90,20 @@ def change(root: ET.Element, changes: Mapping[str, float]) -> None:
             if option is None:
                 option = ET.SubElement(root, "option")
             option.set("gravity", option.get("gravity", "0 0 -9.81"))
+            _check_something(name, [option])
             _multiply(option, "gravity", factor, every=True)
         elif name == "friction":
             _scale(root, "geom", "friction", 1.0, factor)
         elif name == "damping":
+            _check_something(name, root.iter("joint"))
             _scale(root, "joint", "damping", 0.0, factor)
         elif name == LEGS:
             _disable(root, int(factor))
+
+
+def _check_something(name: str, elements: Iterable[ET.Element]) -> None:
+    if not any(float(word) for element in elements for word in element.get(name, "0").split()):
+        raise UserError(f"the model's {name} is 0, and a factor leaves it at that; choose another change")
 
 
 def _scale(root: ET.Element, tag: str, attribute: str, usual: float | None, factor: float) -> None:

@@ -37,6 +37,7 @@ from irl.learners.sac import SACConfig, SACLearner
 from irl.learners.td3 import TD3Config, TD3Learner
 from irl.policies.policy import PolicySpec
 from irl.policies.trainable import drawing, fresh_policy
+from irl.rewards.ensemble import EnsembleSpec
 from irl.rewards.entropic import BOUND, Entropic
 from irl.rewards.learned import LearnedReward
 from irl.rewards.mujoco import HandWritten
@@ -198,7 +199,8 @@ def on_frozen(config: RetrainRun, reward: LearnedReward) -> Forward:
     if config.hand_written:
         paid = HandWritten()
     if isinstance(learner, PPOLearner) and config.entropy:
-        bound = net.log_pi_bound if isinstance(net, ShapedSpec) else BOUND
+        one = net.of if isinstance(net, EnsembleSpec) else net
+        bound = one.log_pi_bound if isinstance(one, ShapedSpec) else BOUND
         paid = Entropic(paid, learner.log_pi, config.entropy, bound)
     return Forward(learner, paid)
 

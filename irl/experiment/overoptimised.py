@@ -22,17 +22,19 @@ def over_run(
     error: Float[np.ndarray, "N"] | None = None,
     then: Sequence[float] | None = None,
     floor: float | None = None,
+    proxy_error: Float[np.ndarray, "N"] | None = None,
 ) -> tuple[dict[str, Any], Fell]:
     """What the two returns of a run's policies say, and what was lost again.
 
     Args:
         error: standard error of each true return, where it is known.
         floor: true return of random actions, which a gain is counted from; the first policy's unless given.
+        proxy_error: standard error of each learned return, where it is known.
         then: return under the reward of the policy's own moment; `proxy` is all by one reward.
     """
     at, learned, true = np.array(steps, dtype=np.int64), np.array(proxy, float), np.array(gold, float)
     try:
-        found = overoptimisation(at, learned, true, error, floor)
+        found = overoptimisation(at, learned, true, error, floor, proxy_error)
     except ValueError as failed:
         return {"reason": str(failed)}, str(failed)
     columns = {"step": steps, "proxy": proxy, "gold": gold}
@@ -51,4 +53,6 @@ def over_run(
     }
     if not np.isfinite(found.lost):
         return content, "the true return never rose beyond its errors"
+    if found.lost and found.proxy_rose is None:
+        return content, f"{found.lost:.2f} was lost while the learned return was the same within its errors"
     return content, (0.0, found.lost) if found.proxy_rose else (found.lost, 0.0)

@@ -1,6 +1,6 @@
 """What `irl evaluate` reads on a probe: distances of the reward, and how its snapshots drifted."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -14,6 +14,7 @@ from irl.core.types import Episode, Transitions, from_episodes
 from irl.demos.load import Demos
 from irl.envs.make import make
 from irl.envs.states import StateRecorder
+from irl.experiment import build
 from irl.experiment.attributed import judge_terms
 from irl.experiment.configs import Imitation
 from irl.experiment.crossplay import play_policies
@@ -86,7 +87,8 @@ def probed(
     distances = judge_distances(reward, base, own, asked.also, asked.seed)
     terms = judge_terms(reward, base, reward.spec.gamma, asked.seed)
     fresh = _fresh(config.env_id, policies, min(FRESH, asked.steps))
-    drift = _drift(demos, policies, rewards, base, fresh, asked.seed)
+    health = Played(_learned_from(config, demos), _held_out(demos), fresh)
+    drift = _drift(health, policies, rewards, base, asked.seed)
     played = play_policies(config.env_id, policies, base, asked.seed, asked.policies_root)
     seen = Seen(rewards, base, played, _held_out(demos), fresh)
     return Probed(distances, terms, drift, judge_trust(seen, drift, asked.seed))
@@ -102,17 +104,21 @@ def _fresh(env_id: str, policies: Mapping[int, Policy], steps: int) -> dict[int,
 
 
 def _drift(
-    demos: Demos,
+    played: Played,
     policies: Mapping[int, Policy],
     rewards: Mapping[int, LearnedReward],
     base: ProbeSet,
-    fresh: Mapping[int, Sequence[Episode]],
     seed: int,
 ) -> dict[str, Any]:
     both = {at: Snapshot(rewards[at], policies[at]) for at in rewards}
-    played = Played(from_episodes(list(demos.episodes)), _held_out(demos), fresh)
     with progress("drift", 2 * len(both) + 1) as report:
         return judge_snapshots(both, base, played, seed, report)
+
+
+def _learned_from(config: Imitation, demos: Demos) -> Transitions:
+    """The steps that were kept of the demonstrations; none of the absorbing state, which nobody plays."""
+    steps = build.demonstrations(config, demos.episodes)
+    return steps if steps.absorbing is None else steps[~steps.absorbing]
 
 
 def _held_out(demos: Demos) -> Transitions | None:

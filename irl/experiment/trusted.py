@@ -13,15 +13,18 @@ from irl.algorithms.probe_set import ProbeSet
 from irl.core.rng import stream
 from irl.core.types import Episode, Transitions
 from irl.diagnostics import ledger
+from irl.diagnostics.hygiene import hygiene
 from irl.diagnostics.overoptimisation import standard_errors
 from irl.diagnostics.residual import residual
 from irl.diagnostics.stack import read, stack
-from irl.diagnostics.verdicts import NAMES, verdicts
+from irl.diagnostics.verdicts import BY_NAME, NAMES, verdicts
 from irl.envs.tasks import task_of
 from irl.experiment.chosen import chosen_of, losses
 from irl.experiment.crossplay import Played, judge_cross_play, returns_of
 from irl.experiment.overoptimised import Fell, over_run
+from irl.rewards.ensemble import EnsembleNet
 from irl.rewards.learned import LearnedReward
+from irl.rewards.mujoco import HandWritten
 from irl.rewards.shaped import ENTROPIC, ShapedNet
 
 SHOWN = 20
@@ -71,6 +74,8 @@ def nothing(reason: str, reward: LearnedReward) -> dict[str, Any]:
 def ledger_of(reward: LearnedReward) -> dict[str, Any]:
     """What this kind of reward determines, on this task."""
     pays, net = reward.spec.reward_map, reward.net
+    # what a mean of several is known to be is what one of them is
+    net = net.each[0] if isinstance(net, EnsembleNet) else net
     kind = ledger.RATIO
     if isinstance(net, ShapedNet):
         of_g = ledger.G_STATES if net.spec.sees == "obs" else ledger.G
@@ -91,6 +96,7 @@ def _proxy_gold(played: Played, returns: Sequence[np.ndarray]) -> tuple[dict[str
         proxy=[float(rows[:, -1].mean()) for _, rows in own],
         gold=[float(rows[:, 0].mean()) for _, rows in own],
         error=standard_errors([rows[:, 0] for _, rows in own]),
+        proxy_error=standard_errors([rows[:, -1] for _, rows in own]),
         then=[float(rows[:, 1 + i].mean()) for i, (_, rows) in enumerate(own)],
         floor=float(random[0]) if random and np.isfinite(random[0]) else None,
     )
@@ -109,6 +115,12 @@ def _residual(reward: LearnedReward, base: ProbeSet, seed: int) -> dict[str, Any
     return {"r2": found.r2, "share": found.share, "features": features}
 
 
+def _survival_asked_for(base: ProbeSet) -> float:
+    """|mean| / (|mean| + deviation) of the hand-written reward there; NaN where it is not known."""
+    batch = stack(base).batch
+    return abs(hygiene(read(HandWritten(), batch), batch.terminated.numpy()).survival_bias)
+
+
 def _numbers(
     steps: Sequence[int], drift: Mapping[str, Any], base: ProbeSet, cross: Mapping[str, Any], fell: Fell
 ) -> tuple[dict[str, float | None], dict[str, str]]:
@@ -117,23 +129,27 @@ def _numbers(
     half = [d for s, d in before if s > 0 and abs(s - last / 2) <= last / 8]
     late = [d for s, d in before if s >= 0.75 * last]
     health = drift["health"][-1]
-    hygiene = drift["hygiene"][-1]
+    scale = drift["hygiene"][-1]
     ends = any(episode.terminated for episodes in base.values() for episode in episodes)
-    bias, truth = hygiene["survival_bias"], drift["to_truth"][-1]
+    bias, truth = scale["survival_bias"], drift["to_truth"][-1]
+    asked = _survival_asked_for(base)
+    told = ends and not asked > BY_NAME["survival-biased"].threshold
     numbers = {
         "close": truth["value"],
         "moved": half[-1] if half else None,
         "stable": max(late) if late and None not in late else None,
-        "flat": hygiene["std"],
+        "flat": scale["std"],
         "saturated": (health["held_out"] or health["train"])["saturated"],
-        "survival-biased": abs(bias) if ends and bias is not None else None,
+        "survival-biased": abs(bias) if told and bias is not None else None,
         "misleading": cross["agreement"][-1]["regret"]["value"] if "agreement" in cross else None,
     }
     reasons = {
         "close": truth.get("reason") or "the distance to the hand-written reward is not known",
         "moved": "there is no snapshot near half of the run that has a distance",
         "stable": "there is no snapshot in the last quarter of the run before its end that has a distance",
-        "survival-biased": "no episode of the probe ends early",
+        "survival-biased": f"the hand-written reward is at {asked:.2f} itself"
+        if ends
+        else "no episode of the probe ends early",
         "misleading": cross.get("reason") or "how far its favourite is from the best is not known",
     }
     if isinstance(fell, str):

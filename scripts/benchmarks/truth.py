@@ -110,7 +110,9 @@ def line(found: dict[str, Any], fresh: list[dict[str, Any]], controls: dict[tupl
     """A row; a dash is what is unknown, or may not be believed."""
     terms, weights = found["terms"], found["terms"].get("weights") or {}
     forward, ctrl = weights.get("forward", {}), weights.get("ctrl", {})
-    believed = ctrl.get("relative") if ctrl.get("why_not") is None else None
+    # to forward, so both have to be believed
+    known = forward.get("why_not") is None and ctrl.get("why_not") is None
+    believed = ctrl.get("relative") if known else None
     here = [row for row in fresh if "dynamics" not in row]
     control = [controls[key]["score"] for key in map(circumstances, here) if key in controls]
     taught = [f"{row['score']:.3f} ({row['score'] / row['score_of_the_run']:.2f})" for row in here]

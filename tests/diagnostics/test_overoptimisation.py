@@ -84,7 +84,14 @@ def test_what_moves_by_less_than_its_errors_stands_still() -> None:
 def test_a_proxy_that_follows_gold_never_decouples() -> None:
     assert decoupling(gao(), gao(), np.zeros(len(D))) is None
     assert overoptimisation(STEPS, gao(), gao()).gap == pytest.approx(0.0)
-    assert not overoptimisation(STEPS, gao(), gao()).proxy_rose
+    assert overoptimisation(STEPS, gao(), gao()).proxy_rose is False
+
+
+def test_a_proxy_that_moved_within_its_errors_neither_rose_nor_fell() -> None:
+    proxy = np.where(STEPS[-1] == STEPS, 10.2, 10.0)
+    for error, rose in ((0.0, True), (0.05, True), (0.1, None)):
+        errors = np.full(len(D), error)
+        assert overoptimisation(STEPS, proxy, gao(), proxy_error=errors).proxy_rose is rose
 
 
 def test_aicc_is_its_formula_and_monotone_curves_fit_themselves() -> None:

@@ -130,6 +130,12 @@ def test_what_it_cannot_do_is_said() -> None:
         (EPISODES, [r[:-1] for r in learned], "a learned reward for each step"),
         (EPISODES, [r * np.nan for r in learned], "not finite"),
         ([replace(e, terms={}) for e in EPISODES], learned, "no term"),
+        (EPISODES, [np.full(len(r), 0.1) for r in learned], "reward is constant"),
+        (
+            [replace(e, terms={n: v * np.nan for n, v in e.terms.items()}) for e in EPISODES],
+            learned,
+            "terms are not",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             attribute(episodes, rewards, gamma=GAMMA, rng=rng)

@@ -105,6 +105,8 @@ def test_no_file_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         ("Hopper-v5", 3, "dynamics is 3"),
         ("Ant-v5", {"disabled_legs": 4}, "disabled_legs=4"),
         ("Pendulum-v1", {"mass": 2.0}, "no MuJoCo task"),
+        ("Swimmer-v5", {"damping": 2.0}, "model's damping is 0"),
+        ("Pusher-v5", {"gravity": 2.0}, "model's gravity is 0"),
     ],
 )
 def test_what_is_no_change_is_one_line(env_id: str, changes: Any, said: str) -> None:

@@ -15,10 +15,13 @@ from irl.core import files
 from irl.core.nets import Normaliser
 from irl.core.records import open_run
 from irl.core.types import from_episodes
+from irl.demos.load import Demos
+from irl.discriminators.gail import GAILConfig
 from irl.envs.rollouts import rollouts
 from irl.experiment import build
-from irl.experiment.configs import AIRLRun, AIRLSACRun
+from irl.experiment.configs import AIRLRun, AIRLSACRun, GAILRun
 from irl.experiment.logits import Snapshot
+from irl.experiment.probed import _learned_from
 from irl.learners.ppo import PPOConfig
 from irl.policies.density import Density
 from irl.policies.policy import load_policy
@@ -98,6 +101,17 @@ def test_what_is_missing_for_a_probe_is_one_line(words, irl: Command, capsys) ->
     assert stop.value.code == 2
     said = capsys.readouterr().err
     assert any(hint in said for hint in ("give --env-id", "irl experts train", "holds no run"))
+
+
+@pytest.mark.parametrize("scale", [0.0, 10.0])
+def test_a_discriminator_is_judged_on_the_steps_it_was_shown(scale: float) -> None:
+    episodes = tuple(pointmass.demonstrations(3))
+    demos = Demos(episodes, (), (0, 1, 2), (), "irl/p-v0", TASK, Path(), None, None)
+    given = GAILConfig(absorbing_scale=scale)
+    kept = _learned_from(GAILRun(env_id=TASK, demo_rate=10, discriminator=given), demos)
+    assert len(kept) == 9
+    every = {tuple(row) for row in from_episodes(episodes).obs.tolist()}
+    assert {tuple(row) for row in kept.obs.tolist()} < every
 
 
 def test_the_parts_of_airl_are_apart(irl: Command) -> None:

@@ -1,6 +1,7 @@
 """What `irl evaluate` says of trusting a reward, and the gate that it has to pass."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +10,22 @@ import pytest
 
 from irl.algorithms.probe_set import ProbeSet
 from irl.core import files
+from irl.core.nets import fitted_normaliser
+from irl.core.rng import torch_stream
+from irl.core.types import from_episodes
+from irl.diagnostics.ledger import F, G
 from irl.diagnostics.verdicts import NAMES
 from irl.envs.rollouts import rollouts
 from irl.experiment import evaluate
 from irl.experiment.cli import main
 from irl.experiment.crossplay import EPISODES, Played, Player, judge_cross_play, play_policies, returns_of
 from irl.experiment.gate import BOUNDS, Gate, broken
-from irl.experiment.trusted import _numbers, _proxy_gold
+from irl.experiment.trusted import _numbers, _proxy_gold, ledger_of
 from irl.report.folder import lookup
+from irl.rewards.averaged import averaged
+from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.mujoco import HandWritten
+from irl.rewards.shaped import ShapedNet, ShapedSpec
 from tests import pointmass
 from tests.experiment.conftest import DATASET, LOOK, QUICK, TASK
 
@@ -109,6 +117,8 @@ def test_a_fall_beside_a_rising_proxy_is_hacking_and_beside_a_falling_one_a_coll
     assert (content["peak_step"], content["fit"]) == (2, None)
     assert fallen(gold, [0.0, 1.0, 2.0, 0.5])[1] == (pytest.approx(0.6), 0.0)
     assert fallen([0.0, 5.0, 10.0, 11.0], [0.0, 1.0, 2.0, 3.0])[1] == (0.0, 0.0)
+    unsaid = fallen(gold, [0.0, 1.0, 2.0, 2.0])[1]
+    assert unsaid == "0.60 was lost while the learned return was the same within its errors"
     assert "never rose" in fallen([0.0, -1.0, -2.0, -3.0], [0.0, 1.0, 2.0, 3.0])[1]
 
 
@@ -149,6 +159,24 @@ def test_the_numbers_of_the_verdicts_are_where_their_rules_say() -> None:
     ended = ProbeSet(TASK, {"x": tuple(fell)})
     numbers, _ = _numbers([0, 100], drift | {"to_final": [0.9, 0.0]}, ended, played, "")
     assert numbers["survival-biased"] == 0.9
+    # nor is a reward blamed for what the hand-written one asks for
+    paid = [replace(episode, reward=np.ones_like(episode.reward)) for episode in fell]
+    numbers, reasons = _numbers([0, 25, 50, 75, 100], drift, ProbeSet(TASK, {"x": tuple(paid)}), played, "")
+    assert numbers["survival-biased"] is None
+    assert reasons["survival-biased"] == "the hand-written reward is at 1.00 itself"
+
+
+@pytest.mark.parametrize("part", ["g", "f"])
+def test_a_mean_of_rewards_determines_what_one_of_them_does(part: str) -> None:
+    shape = ShapedSpec(2, 2, (4,), (4,), "tanh")
+    steps = from_episodes(pointmass.demonstrations(1))
+    rewards = []
+    for i in range(2):
+        net = ShapedNet(shape, fitted_normaliser(steps.obs), torch_stream(i, "net"))
+        spec = RewardSpec(TASK, "airl", part, "obs, action", shape, 0.98, 1.0, i, {})
+        rewards.append(LearnedReward(spec, net))
+    assert ledger_of(averaged(rewards)) == ledger_of(rewards[0])
+    assert ledger_of(rewards[0])["kind"] == (G if part == "g" else F)
 
 
 def test_the_gate_is_held_against_every_bound() -> None:
