@@ -102,8 +102,12 @@ def _order(run: RunFiles) -> str:
 
 
 def _retrained(run: RunFiles) -> str:
+    """Of the learned reward where it was learned: neither of the control nor of other dynamics."""
     rows = run.retrained.get("rows")
-    ratios = [finite(lookup(row, "ratio.value")) for row in rows] if isinstance(rows, list) else []
+    found = [row for row in rows if isinstance(row, Mapping)] if isinstance(rows, list) else []
+    learned = [row for row in found if row.get("part") != "hand-written"]
+    here = [row for row in learned if row.get("dynamics") == "as trained"]
+    ratios = [finite(lookup(row, "ratio.value")) for row in here]
     known = [ratio for ratio in ratios if ratio is not None]
     if not known:
         tested = run.retrain or not run.evaluation

@@ -59,3 +59,23 @@ def test_a_reward_that_was_nearer_before_is_said_to_have_gone_away(
 
 def test_what_is_not_known_is_left_out_of_it(run: Path) -> None:
     assert "distance" not in " ".join(summary(read_run(run)))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"part": "hand-written"}, "88 % or more"),
+        ({"dynamics": "mass=1.5"}, "88 % or more"),
+        ({"ratio": {"value": 0.25}}, "25 % or more"),
+    ],
+)
+def test_what_fresh_policies_reach_is_of_the_reward_where_it_was_learned(
+    run: Path, evaluation: dict[str, Any], more: dict[str, Any], said: str
+) -> None:
+    whole.write(run, evaluation)
+    (row,) = json.loads((run / "retrained.json").read_text())["rows"]
+    other = row | {"ratio": {"value": 0.1}} | more
+    (run / "retrained.json").write_text(json.dumps({"rows": [row, other]}))
+    assert said in " ".join(summary(read_run(run)))
+    (run / "retrained.json").write_text(json.dumps({"rows": [row | {"part": "hand-written"}]}))
+    assert "irl retrain tries that" in " ".join(summary(read_run(run)))

@@ -164,5 +164,11 @@ def write(run: Path, evaluation: dict[str, Any]) -> None:
     (reward / "spec.json").write_text(json.dumps({"method": "gail", "reward_map": "gail", "gamma": 0.99}))
     (reward / "weights.safetensors").write_bytes(b"weights")
     ratio = {"value": 0.875, "low": 0.7, "high": 1.0}
-    row = {"snapshot": 122880, "part": None, "dynamics": {}, "seeds": [1, 2], "returns": [3000.0, 3100.0]}
+    row = {
+        "snapshot": 122880,
+        "part": "gail",
+        "dynamics": "as trained",
+        "seeds": [1, 2],
+        "returns": [3000.0, 3100.0],
+    }
     (run / "retrained.json").write_text(json.dumps({"rows": [row | {"scores": [0.9, 0.95], "ratio": ratio}]}))
