@@ -40,8 +40,9 @@ def imitate(
 ) -> LearnedReward:
     """Train a ready-made PPO or SAC on a reward learned from `demos`; the reward as it is at the end.
 
-    The model keeps its networks, settings and environments, and is trained in place, from where it is: what
-    was learned before counts. Time limits, and what follows a termination, are as with `irl train`.
+    The model is trained in place, from where it is: what was learned before counts. Its settings, its
+    environments and its memory (a SAC's, without these steps) are as before when it ends, so it can learn on.
+    Time limits, and what follows a termination, are as with `irl train`.
 
     Args:
         model: of stable_baselines3, with environments of flat Box observations and actions.
@@ -65,15 +66,18 @@ def imitate(
     _check(model, expert, method, settings)
     scale = settings.scale if isinstance(settings, AIRLConfig) else settings.absorbing_scale
     learner = ready(model, steps, absorbing=scale > 0)
-    judge = _discriminator(learner, expert, settings, seed)
-    if scale:
-        expert = absorb(expert)
-    rng = torch_stream(seed, "minibatches", model.device)
-    algorithm = _algorithm(learner, judge, expert.to(model.device), schedule, rng, scale > 0)
-    for round_ in algorithm.rounds(steps):
-        if on_round is not None:
-            on_round(round_)
-    return _reward(learner, judge, method, seed)
+    try:
+        judge = _discriminator(learner, expert, settings, seed)
+        if scale:
+            expert = absorb(expert)
+        rng = torch_stream(seed, "minibatches", model.device)
+        algorithm = _algorithm(learner, judge, expert.to(model.device), schedule, rng, scale > 0)
+        for round_ in algorithm.rounds(steps):
+            if on_round is not None:
+                on_round(round_)
+        return _reward(learner, judge, method, seed)
+    finally:
+        learner.close()
 
 
 def _refused(method: str) -> str:

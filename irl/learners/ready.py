@@ -34,6 +34,7 @@ class _Ready:
     def __init__(self, model: PPO | SAC, steps: int) -> None:
         check_model(model)
         assert model.env is not None
+        self._given, self._before = model, model.env
         self.venv = Recorder(model.env)
         model.set_env(self.venv)
         _, self._callback = model._setup_learn(steps, callback=None)
@@ -56,7 +57,8 @@ class _Ready:
         self.state_dict()
 
     def close(self) -> None:
-        """Nothing: the environments are the model's."""
+        """Give the model its environments back, which pay what they paid; they stay open."""
+        self._given.set_env(self._before)
 
 
 class ReadyPPO(_Ready, Rollouts):
@@ -91,10 +93,16 @@ class ReadySAC(_Ready):
         """`steps_per_round` lie between two reports; `absorbing` is told of `RewardedReplay`."""
         super().__init__(model, steps)
         self.model, self._per_round = model, steps_per_round
+        self._memory_before = model.replay_buffer
         self._memory = model.replay_buffer = RewardedReplay(model, absorbing)
         box = model.action_space
         assert isinstance(box, Box)
         self._half = torch.as_tensor((box.high - box.low) / 2, device=model.device)
+
+    def close(self) -> None:
+        """Give the model its environments and its memory back, as they were."""
+        super().close()
+        self.model.replay_buffer = self._memory_before
 
     @property
     def env_steps(self) -> int:

@@ -89,8 +89,9 @@ HOW: dict[str, tuple[str, str]] = {
     "retrain": (
         "Retrain and transfer",
         "A fresh policy from random weights, on the reward of one snapshot, frozen. Score: its true return "
-        "between random (0) and expert (1). Ratio: over the return of the policy that was trained beside the "
-        "reward. Made by: irl retrain. Source code: irl/experiment/retrain.py.",
+        "between random (0) and expert (1). Ratio: how far it comes from random actions, of how far the "
+        "policy comes that was trained beside the reward; of several seeds by their interquartile mean. Made "
+        "by: irl retrain. Source code: irl/experiment/retrain.py.",
     ),
     "trust": (
         "Self-tests and coverage",

@@ -109,11 +109,15 @@ def _retrained(run: RunFiles) -> str:
     here = [row for row in learned if row.get("dynamics") == "as trained"]
     ratios = [finite(lookup(row, "ratio.value")) for row in here]
     known = [ratio for ratio in ratios if ratio is not None]
+    if here and not known:
+        return f"Of fresh policies on the frozen reward there is no ratio: {here[-1].get('ratio_reason')}."
     if not known:
         tested = run.retrain or not run.evaluation
         untested = "Whether a fresh policy learns the task from it is not known: irl retrain tries that."
         return "" if tested else untested
-    return f"Fresh policies on the frozen reward reach {percent(min(known))} or more of the return beside it."
+    least = f"{percent(min(known))}{' or more' if len(known) > 1 else ''}"
+    way = "of the way from random actions to the policy beside it"
+    return f"Fresh policies on the frozen reward get {least} {way}, on the mean of their seeds."
 
 
 def _outside(run: RunFiles) -> str:

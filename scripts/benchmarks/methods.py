@@ -12,6 +12,7 @@ import json
 import shlex
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -67,34 +68,36 @@ def cell(settings: Settings, task: str, seed: int) -> dict[str, Any]:
     root = settings.runs / "datasets"
     demonstrations(task, root)
     run = settings.runs / f"{settings.method}-{task_name(task)}-s{seed}"
-    if (run / "config.json").is_file():
-        check_same(settings, seed, run)
-        irl("train", "--resume", str(run))
-    else:
-        words = (
-            "--env-id",
-            task,
-            "--demo-episodes",
-            "5",
-            "--steps",
-            str(settings.steps),
-            "--seed",
-            str(seed),
-        )
-        where = ("--out", str(run), "--datasets-root", str(root))
-        irl("train", settings.method, *words, *where, *shlex.split(settings.extra))
+    words = ("--env-id", task, "--demo-episodes", "5", "--steps", str(settings.steps), "--seed", str(seed))
+    where = ("--datasets-root", str(root))
+    begin_or_resume("train", run, settings.method, *words, *where, *shlex.split(settings.extra))
     irl("evaluate", str(run))
     return result(settings, task, seed, run)
 
 
-def check_same(settings: Settings, seed: int, run: Path) -> None:
-    """Stop where a run folder that is there is of another cell than the one that is asked for."""
-    config = json.loads((run / "config.json").read_text())
-    command = json.loads((run / "environment.json").read_text())["command"]
-    asked, has = {"seed": seed, "steps": settings.steps}, {name: config[name] for name in ("seed", "steps")}
-    if asked != has or not set(shlex.split(settings.extra)) <= set(shlex.split(command)):
+def begin_or_resume(command: str, run: Path, *words: str) -> None:
+    """`irl COMMAND words --out RUN`, or its resumption where that was begun, by these words alone."""
+    words = (*words, "--out", str(run))
+    if not (run / "config.json").is_file():
+        irl(command, *words)
+        return
+    begun = json.loads((run / "environment.json").read_text())["command"]
+    if _no_places(shlex.split(begun)) != _no_places((command, *words)):
+        asked = shlex.join((command, *words))
+        raise SystemExit(f"{run} was begun by `{begun}`, not by `{asked}`; choose another --runs")
+    irl(command, "--resume", str(run))
+
+
+def _no_places(words: Sequence[str]) -> set[str]:
+    """What a command says but where things are."""
+    return {word for word in words if "/" not in word} - {"-c", "irl"}
+
+
+def check_extra(file: Path, extra: str) -> None:
+    """Stop where a result that is there was made with other words."""
+    if (made := json.loads(file.read_text())["extra"]) != extra:
         raise SystemExit(
-            f"{run} was begun by `{command}`; {asked} {settings.extra} is another cell: choose another --runs"
+            f"{file} was made with --extra {made!r}, not {extra!r}; choose another --out and --runs"
         )
 
 
@@ -135,6 +138,7 @@ def main(settings: Settings) -> None:
         for seed in settings.seeds:
             file = settings.out / settings.method / f"{task_name(task)}-s{seed}.json"
             if file.is_file():
+                check_extra(file, settings.extra)
                 print(f"{file} is there", flush=True)
                 continue
             row = cell(settings, task, seed)

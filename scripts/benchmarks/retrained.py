@@ -18,7 +18,7 @@ import tyro
 
 # beside this file
 from judged import HAND_WRITTEN, reward_name
-from methods import RESULTS, Method, irl
+from methods import RESULTS, Method, begin_or_resume, check_extra
 
 from irl.core.provenance import command_line
 from irl.core.records import open_run
@@ -54,12 +54,9 @@ class Settings:
 def cell(settings: Settings, run: Path, snapshot: int, part: str | None, name: str) -> dict[str, Any]:
     """Train on the frozen reward, or go on, and say what it came to."""
     folder = settings.runs / f"retrained-{settings.method}-{name}"
-    if (folder / "config.json").is_file():
-        irl("retrain", "--resume", str(folder))
-    else:
-        words = ["--algo", settings.algo, "--steps", str(settings.steps), "--out", str(folder)]
-        of = ["--part", part] if part else []
-        irl("retrain", str(run), "--snapshot", str(snapshot), *words, *of, *shlex.split(settings.extra))
+    words = ("--snapshot", str(snapshot), "--algo", settings.algo, "--steps", str(settings.steps))
+    of = ("--part", part) if part else ()
+    begin_or_resume("retrain", folder, str(run), *words, *of, *shlex.split(settings.extra))
     found = json.loads((folder / "retrain.json").read_text())
     beside = json.loads((run / "evaluation.json").read_text())["policy"]
     environment = json.loads((folder / "environment.json").read_text())
@@ -97,6 +94,7 @@ def main(settings: Settings) -> None:
                     name = "-".join([task_name(task), f"s{seed}", str(snapshot), *([part] if part else [])])
                     file = settings.out / "retrained" / settings.method / f"{name}.json"
                     if file.is_file():
+                        check_extra(file, settings.extra)
                         print(f"{file} is there", flush=True)
                         continue
                     row = cell(settings, run, snapshot, part, name)

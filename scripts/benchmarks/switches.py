@@ -96,22 +96,8 @@ def cell(settings: Settings, method: str, task: str, switch: str) -> dict[str, A
     steps, words = settings.steps or STEPS[method], cells(method)[switch]
     extra = f"{words} {settings.extra}".strip()
     asked = methods.Settings(method, (task,), (settings.seed,), steps, extra)  # pyright: ignore[reportArgumentType]
-    if (run / "config.json").is_file():
-        methods.check_same(asked, settings.seed, run)
-        methods.irl("train", "--resume", str(run))
-    else:
-        given = (
-            "--env-id",
-            task,
-            "--demo-episodes",
-            "5",
-            "--steps",
-            str(steps),
-            "--seed",
-            str(settings.seed),
-        )
-        where = ("--out", str(run), "--datasets-root", str(root))
-        methods.irl("train", method, *given, *where, *shlex.split(words), *shlex.split(settings.extra))
+    given = ("--env-id", task, "--demo-episodes", "5", "--steps", str(steps), "--seed", str(settings.seed))
+    methods.begin_or_resume("train", run, method, *given, "--datasets-root", str(root), *shlex.split(extra))
     methods.irl("evaluate", str(run))
     return {"switch": switch, **methods.result(asked, task, settings.seed, run)}
 

@@ -19,7 +19,7 @@ import tyro
 
 # beside this file
 from judged import HAND_WRITTEN, reward_name
-from methods import RESULTS, irl
+from methods import RESULTS, check_extra, irl
 
 from irl.core.provenance import command_line
 from irl.core.records import open_run
@@ -108,7 +108,13 @@ def main(settings: Settings) -> None:
         whose = run.name if reward == HAND_WRITTEN else run.name.split("-", 1)[1]
         name = "-".join((reward, whose, *settings.dynamics))
         file = settings.out / f"{name.replace('=', '-')}.json"
-        if not file.is_file():
+        if file.is_file():
+            check_extra(file, settings.extra)
+            if (seeds := json.loads(file.read_text())["seeds"]) != list(settings.seeds):
+                raise SystemExit(
+                    f"{file} is of seeds {seeds}, not {list(settings.seeds)}; choose another --out"
+                )
+        else:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(json.dumps(cell(settings, run, reward, config), indent=1) + "\n")
     if settings.table:

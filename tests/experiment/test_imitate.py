@@ -42,6 +42,24 @@ def test_the_model_is_trained_in_place_and_the_reward_is_an_artefact(
     assert torch.equal(load_reward(tmp_path)(steps), reward(steps))
 
 
+@pytest.mark.parametrize("algorithm", MAKE)
+def test_the_model_can_learn_on_and_imitate_again(algorithm: str) -> None:
+    model, small = MAKE[algorithm](own := envs("PointMass-v0")), GAILConfig(hidden=(8,))
+    memory, demos = getattr(model, "replay_buffer", None), pointmass.demonstrations(2)
+    for _ in range(2):
+        irl.imitate(model, demos, steps=200, discriminator=small)
+        assert model.get_env() is own
+        assert getattr(model, "replay_buffer", None) is memory
+    wrong: Any = InterleavedConfig() if algorithm == "PPO" else ScheduleConfig()
+    with pytest.raises(ValueError, match="schedule is a"):
+        irl.imitate(model, demos, steps=200, discriminator=small, schedule=wrong)
+    assert model.get_env() is own
+    model.learn(100, reset_num_timesteps=False)
+    paid = model.rollout_buffer.rewards if algorithm == "PPO" else memory.rewards[: memory.pos]  # pyright: ignore
+    # the task's own reward, which is never 0 away from the origin
+    assert (paid < 0).all()
+
+
 def test_gail_teaches_a_ready_made_ppo_the_task() -> None:
     model = PPO(
         "MlpPolicy",
