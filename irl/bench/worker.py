@@ -70,8 +70,16 @@ def carry_out(cell: Cell, places: Places, processes: Processes) -> Outcome:
         return Outcome(cell, begin(cell, places, processes))
     except Failed as failed:
         return Outcome(cell, why=str(failed), killed=failed.killed)
-    except (UserError, OSError) as error:
-        return Outcome(cell, why=" ".join(str(error).split()))
+    except Exception as error:
+        # whatever it is: the cells beside this one have nothing to do with it
+        return Outcome(cell, why=reason(error))
+
+
+def reason(error: Exception) -> str:
+    """What became of a cell, in one line; with its type where nobody foresaw it."""
+    said = " ".join(str(error).split())
+    foreseen = isinstance(error, UserError | OSError)
+    return said if foreseen and said else f"{type(error).__name__}: {said}".removesuffix(": ")
 
 
 def _train(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:

@@ -159,6 +159,19 @@ def test_a_cell_that_fails_is_reported_and_the_rest_goes_on(
     assert "irl: bc-humanoidstandup-d2-s21: no expert policy for HumanoidStandup-v5 on the shelf" in said
 
 
+def test_an_error_that_nobody_foresaw_is_its_cells_alone(
+    bench: Command, commands: list, capsys: pytest.CaptureFixture
+) -> None:
+    bench("--only", "bc-pointmass-d2-s21")
+    Path("results/small/bc-pointmass-d2-s21.json").unlink()
+    Path("runs/small/bc-pointmass-d2-s21/metrics.jsonl").unlink()
+    with pytest.raises(SystemExit) as stop:
+        bench("--only", "bc-pointmass")
+    assert stop.value.code == 1
+    assert [path.stem for path in Path("results/small").glob("*.json")] == ["bc-pointmass-d2-s22"]
+    assert "irl: bc-pointmass-d2-s21: IndexError: list index out of range" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("before", "after", "complaint"),
     [
