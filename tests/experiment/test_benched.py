@@ -145,6 +145,30 @@ def test_a_cell_goes_on_where_it_was_and_what_it_was_not_is_refused(
     assert "was begun as another cell: steps was 512 and is 640" in capsys.readouterr().err
 
 
+def test_an_evaluation_of_half_a_run_is_made_again(
+    bench: Command, commands: list, capsys: pytest.CaptureFixture
+) -> None:
+    one, early = (
+        ("--only", "gail-pointmass-d2-s21-ppo"),
+        Path("runs/small/gail-pointmass-d2-s21/evaluation.json"),
+    )
+    bench("--only", "gail-pointmass-d2-s21")
+    result = Path("results/small/gail-pointmass-d2-s21.json")
+    before = json.loads(result.read_text())
+    half = json.loads(early.read_text()) | {"env_steps": 256}
+    early.write_text(json.dumps(half))
+    Path("results/small/gail-pointmass-d2-s21-ppo-on-100.json").unlink()
+    # the run has its result, so nobody evaluates it for the retraining
+    with pytest.raises(SystemExit):
+        bench(*one)
+    assert "evaluation.json is not of the run's last snapshot; make it again: irl evaluate" in (
+        capsys.readouterr().err
+    )
+    result.unlink()
+    bench(*one)
+    assert json.loads(result.read_text()) == before
+
+
 def test_a_cell_that_fails_is_reported_and_the_rest_goes_on(
     bench: Command, commands: list, capsys: pytest.CaptureFixture
 ) -> None:
