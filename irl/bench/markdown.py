@@ -14,12 +14,19 @@ LISTED = 8
 Result = Mapping[str, Any]
 
 
-def section(name: str, results: Sequence[Result], grid: Grid | None, cells: Sequence[Cell]) -> str:
+def section(
+    name: str,
+    results: Sequence[Result],
+    grid: Grid | None,
+    cells: Sequence[Cell],
+    left_out: Sequence[str] = (),
+) -> str:
     """Averages, each run, which method is better, rewards, and what none of it shows.
 
     Args:
         grid: None where the results are of no grid that is there.
         cells: those of the grid, whether or not they have a result.
+        left_out: results of other cells in the folder, each with the reason.
     """
     arms = arms_of(results)
     parts = [
@@ -30,7 +37,7 @@ def section(name: str, results: Sequence[Result], grid: Grid | None, cells: Sequ
         _runs_table(arms),
         _comparison_table(arms),
         _reward_table(arms),
-        _not_shown(results, grid, cells),
+        _not_shown(results, grid, cells, left_out),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -148,7 +155,9 @@ def _provenance(results: Sequence[Result]) -> str:
     )
 
 
-def _not_shown(results: Sequence[Result], grid: Grid | None, cells: Sequence[Cell]) -> str:
+def _not_shown(
+    results: Sequence[Result], grid: Grid | None, cells: Sequence[Cell], left_out: Sequence[str]
+) -> str:
     seeds = [len(of) for arm in arms_of(results) for of in arm.by_task.values()]
     least, most = min(seeds), max(seeds)
     few = str(most) if least == most else f"{least} to {most}"
@@ -156,6 +165,8 @@ def _not_shown(results: Sequence[Result], grid: Grid | None, cells: Sequence[Cel
     there = {result["file"].removesuffix(".json") for result in results}
     if missing := [cell.name for cell in cells if cell.name not in there]:
         said.insert(0, f"{len(missing)} of {len(cells)} cells have no result: {', '.join(_some(missing))}.")
+    if left_out:
+        said.append(f"Left out, as of no cell of the grid as it is: {' | '.join(_some(left_out))}.")
     said.append("Seconds are of machines with other work beside, so they compare within this table at best.")
     said += grid.not_shown if grid else ()
     return "\n".join(["What this does not show:", "", *(f"- {sentence}" for sentence in said)])

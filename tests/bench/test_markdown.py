@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from irl.bench.arms import arm_averages, arms_of, scorer, speed
 from irl.bench.cells import Cell, expand
+from irl.bench.comparable import of_grid
 from irl.bench.estimate import all_results
 from irl.bench.figure import curves
 from irl.bench.grid import SHIPPED, Grid, read_grid
@@ -31,7 +33,8 @@ def grid_of(name: str) -> tuple[Grid | None, list[Cell]]:
 
 def rebuilt(name: str) -> str:
     grid, cells = grid_of(name)
-    return section(name, read_results(BENCHMARKS / "results" / name, cells), grid, cells)
+    results, left_out = of_grid(read_results(BENCHMARKS / "results" / name, cells), cells)
+    return section(name, results, grid, cells, left_out)
 
 
 def test_there_are_made_parts_and_one_for_each_grid_with_results() -> None:
@@ -86,6 +89,24 @@ def test_results_without_a_score_or_an_interval_are_shown_as_unknown() -> None:
     assert "| gail | Own | 1 | - | 5 | 2 s | - - - | - - - |" in said
     assert estimate(Estimate(0.5, math.nan, math.nan)) == ".500"
     assert estimate(Estimate(0.951, 0.9, 1.01)) == ".951 (.900 to 1.010)"
+
+
+def test_results_of_another_grid_are_left_out_and_named() -> None:
+    grid, cells = grid_of("core")
+    results = read_results(BENCHMARKS / "results" / "core", cells)
+    slower = [replace(c, steps=9) if c.name == "gail-ant-d5-s22" else c for c in cells]
+    slower = [cell for cell in slower if cell.name != "bc-ant-d5-s21"]
+    kept, left_out = of_grid(results, slower)
+    assert {r["file"] for r in results} - {r["file"] for r in kept} == {
+        "gail-ant-d5-s22.json",
+        "bc-ant-d5-s21.json",
+    }
+    said = section("core", kept, grid, slower, left_out)
+    assert "31 of 59 cells have no result" in said
+    assert "gail-ant-d5-s22.json: steps was 1000000 and is 9" in said
+    assert "bc-ant-d5-s21.json: the grid has no such cell" in said
+    with pytest.raises(UserError, match="no result is of a cell of grid core as it is now"):
+        of_grid(results[:1], cells[:1])
 
 
 def test_a_folder_without_results_or_with_a_damaged_one_is_refused(tmp_path: Path) -> None:

@@ -120,6 +120,12 @@ def test_a_grid_is_carried_out_once_and_its_tables_are_made_from_what_it_leaves(
     assert len([e for e in drawn.iter() if e.tag.endswith("polyline")]) == 4
     irl("bench", "table", "small.toml", *written, "--write")
     assert (Path("RESULTS.md").read_text(), Path("README.md").read_text()) == (first, readme)
+    Path("small.toml").write_text(GRID.replace("steps = 40", "steps = 60"))
+    capsys.readouterr()
+    irl("bench", "table", "small.toml", *written)
+    said = capsys.readouterr().out
+    assert "bc-pointmass-d2-s21.json: steps was 40 and is 60" in said
+    assert "| bc |" not in said
 
 
 def test_a_cell_goes_on_where_it_was_and_what_it_was_not_is_refused(
