@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from irl.core.rng import stream
-from irl.core.statistics import iqm, iqm_interval
+from irl.core.statistics import FEW, iqm, iqm_interval
 from irl.report.folder import RunFiles, column, finite, lookup, number
 from irl.report.palette import INK, METHODS, OTHERS, faded, framed
 from irl.report.panel import Cell, Panel, Table, View, absent, plain
@@ -14,8 +14,6 @@ from irl.report.plots import STEPS, thinned
 
 POINTS = 120
 """Steps at which a mean over seeds is taken."""
-FEW = 5
-"""Runs below which an interval over them is hardly one: of two it is the two."""
 Curve = tuple[list[float], list[float]]
 
 
