@@ -56,7 +56,8 @@ def expand(grid: Grid) -> list[Cell]:
     """Every cell, in the order that the file has them.
 
     Raises:
-        UserError: two would have one name, or a retraining names a run that the grid has not.
+        UserError: two would have one name, seeds of one arm would have different settings, or a retraining
+            names a run that the grid has not.
     """
     cells: list[Cell] = []
     for part in grid.part:
@@ -66,6 +67,7 @@ def expand(grid: Grid) -> list[Cell]:
         raise UserError(
             f"grid {grid.name} has two cells called {twice[0]}; give one of their parts a variant"
         )
+    _check_arms(grid.name, cells)
     trained = {cell.name for cell in cells if cell.kind == "train" and cell.method != "bc"}
     for cell in cells:
         if cell.kind == "retrain" and cell.source not in trained:
@@ -74,6 +76,21 @@ def expand(grid: Grid) -> list[Cell]:
                 f"a reward makes; add it, with the same variant, task, demos and seed"
             )
     return cells
+
+
+def _check_arms(name: str, cells: Sequence[Cell]) -> None:
+    """Refuse to count as seeds of one arm what differs in more than the seed."""
+    first: dict[tuple[str, str, int, int], Cell] = {}
+    for cell in cells:
+        other = first.setdefault((cell.arm, cell.task, cell.episodes, cell.rate), cell)
+        of, and_of = ((c.kind, c.steps, c.settings, c.script) for c in (other, cell))
+        if of != and_of:
+            said = (f"{c.kind}, {c.steps:,} steps {' '.join((*c.settings, c.script))}" for c in (other, cell))
+            raise UserError(
+                f"grid {name} has {other.name} ({next(said).strip():.120}) and {cell.name} "
+                f"({next(said).strip():.120}), which tables would take for seeds of one method; give one of "
+                f"their parts a variant"
+            )
 
 
 def _cells(grid: Grid, part: Part, method: str, task: str, given: Given, seed: int) -> list[Cell]:

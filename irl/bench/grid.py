@@ -39,6 +39,17 @@ from irl.core.errors import UserError
 
 SHIPPED = Path(__file__).parent / "grids"
 INHERITED = ("seeds", "tasks", "demos")
+SAID = {
+    "seed": "seeds",
+    "seeds": "seeds",
+    "env-id": "tasks",
+    "demo-episodes": "demos",
+    "demo-rate": "demos",
+    "steps": "steps",
+    "algo": "algo",
+    "snapshot": "shares",
+}
+"""Flags of a command that a part has in words of its own, by which its cells are named and grouped."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +88,9 @@ class Part:
                 raise ValueError(f"{word!r:.60} cannot be part of a file's name: use letters, digits, . _ -")
         for seed in self.seeds:
             check_seed(seed)
+        for name in self.settings:
+            if word := SAID.get(name.replace("_", "-")):
+                raise ValueError(f"settings has {name}, which would contradict the cell; write {word} = ...")
 
 
 @dataclass(frozen=True)

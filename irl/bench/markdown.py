@@ -8,18 +8,26 @@ from irl.bench.cells import Cell
 from irl.bench.grid import Grid
 from irl.bench.statistics import DRAWS
 from irl.bench.typeset import bare, estimate, short, table, thousands
+from irl.core.statistics import FEW
 
 LISTED = 8
 """Commands, machines or missing cells that are named; the rest is counted."""
 Result = Mapping[str, Any]
 
 
-def section(name: str, results: Sequence[Result], grid: Grid | None, cells: Sequence[Cell]) -> str:
+def section(
+    name: str,
+    results: Sequence[Result],
+    grid: Grid | None,
+    cells: Sequence[Cell],
+    notes: Sequence[str] = (),
+) -> str:
     """Averages, each run, which method is better, rewards, and what none of it shows.
 
     Args:
         grid: None where the results are of no grid that is there.
         cells: those of the grid, whether or not they have a result.
+        notes: what else a reader has to know, as `comparable` says it.
     """
     arms = arms_of(results)
     parts = [
@@ -27,10 +35,11 @@ def section(name: str, results: Sequence[Result], grid: Grid | None, cells: Sequ
         _commands(name, results, grid),
         _provenance(results),
         averages_table(arms),
+        _too_narrow(arms),
         _runs_table(arms),
         _comparison_table(arms),
         _reward_table(arms),
-        _not_shown(results, grid, cells),
+        _not_shown(results, grid, cells, notes),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -41,7 +50,8 @@ def summary(name: str, results: Sequence[Result], grid: Grid | None, figure: str
     shown = f"![Score against steps of each method, a panel a task]({figure})"
     said = said[:1].upper() + said[1:]
     made = f"*{said}. Made by `irl bench {name}`; every run and what this does not show: RESULTS.md.*"
-    return "\n\n".join([averages_table(arms_of(results)), shown, made]) + "\n"
+    parts = [averages_table(arms := arms_of(results)), _too_narrow(arms), shown, made]
+    return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def averages_table(arms: Sequence[Arm]) -> str:
@@ -55,6 +65,17 @@ def averages_table(arms: Sequence[Arm]) -> str:
         rows.append((arm.method, arm.demos, steps, tasks, scored, estimate(middle), estimate(mean)))
     heads = ("method", "episodes", "steps", "tasks", "runs", "IQM of the score (95 %)", "mean (95 %)")
     return table(heads, rows)
+
+
+def _too_narrow(arms: Sequence[Arm]) -> str:
+    """What the intervals are worth, where there are any and some task has few seeds."""
+    seeds = [len(scores) for arm in arms for scores in arm.scores(arm.scored_tasks)]
+    if not any(1 < n < FEW for n in seeds):
+        return ""
+    return (
+        f"Intervals over fewer than {FEW} seeds a task are too narrow: simulated with Gaussian scores and 3 "
+        f"seeds a task, one of 95 % for the mean held it in 85 % of cases with five tasks, in 75 % with one."
+    )
 
 
 def _runs_table(arms: Sequence[Arm]) -> str:
@@ -148,7 +169,9 @@ def _provenance(results: Sequence[Result]) -> str:
     )
 
 
-def _not_shown(results: Sequence[Result], grid: Grid | None, cells: Sequence[Cell]) -> str:
+def _not_shown(
+    results: Sequence[Result], grid: Grid | None, cells: Sequence[Cell], notes: Sequence[str]
+) -> str:
     seeds = [len(of) for arm in arms_of(results) for of in arm.by_task.values()]
     least, most = min(seeds), max(seeds)
     few = str(most) if least == most else f"{least} to {most}"
@@ -156,6 +179,7 @@ def _not_shown(results: Sequence[Result], grid: Grid | None, cells: Sequence[Cel
     there = {result["file"].removesuffix(".json") for result in results}
     if missing := [cell.name for cell in cells if cell.name not in there]:
         said.insert(0, f"{len(missing)} of {len(cells)} cells have no result: {', '.join(_some(missing))}.")
+    said += notes
     said.append("Seconds are of machines with other work beside, so they compare within this table at best.")
     said += grid.not_shown if grid else ()
     return "\n".join(["What this does not show:", "", *(f"- {sentence}" for sentence in said)])

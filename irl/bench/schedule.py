@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from irl.bench.cells import Cell
 from irl.bench.pool import Runner
-from irl.bench.worker import Outcome
+from irl.bench.worker import Outcome, reason
 
 TRIES = 5
 """Of a cell that is killed again and again."""
@@ -35,7 +35,8 @@ def play(
     """Carry out every waiting cell that can be; one that fails does not stop the others.
 
     Args:
-        keep: called with each that has a result, before anything else is begun.
+        keep: called with each that has a result, before anything else is begun; a cell that it raises over
+            has failed.
         look: called now and then.
     """
     while (state.waiting or state.running) and not asked_to_stop():
@@ -54,8 +55,12 @@ def play(
 def _settle(state: State, outcome: Outcome, keep: Callable[[Outcome], None]) -> None:
     cell = state.running.pop(outcome.cell.name)
     if outcome.result is not None:
-        keep(outcome)
-        state.done.add(cell.name)
+        try:
+            keep(outcome)
+        except Exception as error:
+            state.failed[cell.name] = f"its result cannot be kept: {reason(error)}"
+        else:
+            state.done.add(cell.name)
     elif outcome.killed and state.tries[cell.name] < TRIES:
         state.waiting.insert(0, cell)
     else:

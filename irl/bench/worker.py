@@ -1,9 +1,6 @@
 """One cell carried out, from wherever it was left, by commands of irl."""
 
-import fcntl
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +10,7 @@ import numpy as np
 from irl.bench import results
 from irl.bench.cells import Cell
 from irl.bench.leash import PROGRAM
-from irl.bench.processes import Processes
+from irl.bench.processes import Processes, held
 from irl.core import files
 from irl.core.config import to_json
 from irl.core.differences import differences
@@ -70,8 +67,16 @@ def carry_out(cell: Cell, places: Places, processes: Processes) -> Outcome:
         return Outcome(cell, begin(cell, places, processes))
     except Failed as failed:
         return Outcome(cell, why=str(failed), killed=failed.killed)
-    except (UserError, OSError) as error:
-        return Outcome(cell, why=" ".join(str(error).split()))
+    except Exception as error:
+        # whatever it is: the cells beside this one have nothing to do with it
+        return Outcome(cell, why=reason(error))
+
+
+def reason(error: Exception) -> str:
+    """What became of a cell, in one line; with its type where nobody foresaw it."""
+    said = " ".join(str(error).split())
+    foreseen = isinstance(error, UserError | OSError)
+    return said if foreseen and said else f"{type(error).__name__}: {said}".removesuffix(": ")
 
 
 def _train(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:
@@ -83,7 +88,7 @@ def _train(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:
     else:
         where = ("--out", str(run), "--datasets-root", str(places.datasets))
         _irl(cell, places, processes, "train", cell.method, *cell.words, *where)
-    if not (run / "evaluation.json").is_file():
+    if not _judged_at_its_end(run):
         _irl(cell, places, processes, "evaluate", str(run), "--frames", "0", *cell.evaluate)
     return results.of_training(cell, run)
 
@@ -96,6 +101,11 @@ def _retrain(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]
             f"the run {cell.source} is not in {places.runs}; train it here, or let every worker see the "
             f"same --runs"
         )
+    if not _judged_at_its_end(source):
+        raise UserError(
+            f"{source / 'evaluation.json'} is not of the run's last snapshot; make it again: irl evaluate "
+            f"{source} --frames 0"
+        )
     there = list(open_run(source).snapshots())
     snapshot = min(there, key=lambda step: abs(step - cell.share * there[-1]))
     if not (run / "retrain.json").is_file():
@@ -105,6 +115,13 @@ def _retrain(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]
             where = ("--snapshot", str(snapshot), "--out", str(run))
             _irl(cell, places, processes, "retrain", str(source), *where, *cell.words)
     return results.of_retraining(cell, run, source, snapshot)
+
+
+def _judged_at_its_end(run: Path) -> bool:
+    """Whether its evaluation is of the last snapshot: one may have been made of a run that was half done."""
+    if not (path := run / "evaluation.json").is_file():
+        return False
+    return files.read_json(path).get("env_steps") == max(open_run(run).snapshots(), default=None)
 
 
 def _peer(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:
@@ -127,7 +144,7 @@ def dataset(task: str, places: Places, processes: Processes) -> None:
     name = task_name(task)
     folder = places.datasets / "irl" / name / "expert-v0"
     log = places.runs / f"dataset-{name}.log"
-    with _held(places.datasets / f".{name}.lock"):
+    with held(places.datasets / f".{name}.lock"):
         if (folder / "data").is_dir():
             return
         # as the command would refuse it, without starting one for each cell
@@ -179,12 +196,3 @@ def _reason(log: Path, status: int) -> str:
     lines = log.read_bytes()[-LAST_LINES:].decode(errors="replace").splitlines()
     said = [line.removeprefix("irl: ") for line in lines if line.startswith("irl: ")]
     return (said or [line for line in lines if line.strip()] or [f"exit status {status}"])[-1].strip()
-
-
-@contextmanager
-def _held(path: Path) -> Iterator[None]:
-    """One process at a time; the system lets go when this one dies."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

@@ -8,6 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import kendalltau, rankdata
 
+FEW = 5
+"""Runs below which an interval over them is hardly one: of two it is the two."""
 ROUNDING = 1e-13
 """A spread below this share of the largest magnitude is what summing terms in float64 leaves."""
 

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from irl.bench.cells import Cell, expand, only
 from irl.bench.cluster import Cluster
+from irl.bench.comparable import changed
 from irl.bench.estimate import Cost, all_results, costs, makespan, measured
 from irl.bench.grid import find_grid, read_grid
 from irl.bench.live import duration, live
@@ -21,8 +22,7 @@ from irl.bench.results import scored
 from irl.bench.schedule import State, play
 from irl.bench.worker import Outcome, Places
 from irl.core import files
-from irl.core.config import check_at_least, to_json
-from irl.core.differences import differences
+from irl.core.config import check_at_least
 from irl.core.errors import UserError
 from irl.experiment.configs import FromDemonstrations
 from irl.experiment.play import Interrupted, asked_to_stop
@@ -128,10 +128,9 @@ def _is_done(cell: Cell, folder: Path) -> bool:
     """
     if not (path := folder / f"{cell.name}.json").is_file():
         return False
-    of = files.read_json(path).get("cell", {})
-    if changed := differences(of, to_json(cell)):
+    if why := changed(files.read_json(path), cell):
         raise UserError(
-            f"{path} is the result of another cell: {'; '.join(changed):.300}; take it away, or give the "
+            f"{path} is the result of another cell: {'; '.join(why):.300}; take it away, or give the "
             f"grid or the part another name"
         )
     return True

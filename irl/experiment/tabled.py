@@ -8,6 +8,7 @@ import tyro
 from rich.console import Console
 
 from irl.bench.cells import Cell, expand
+from irl.bench.comparable import comparable
 from irl.bench.figure import curves
 from irl.bench.grid import Grid, find_grid, read_grid
 from irl.bench.markdown import section, summary
@@ -40,8 +41,8 @@ def bench_table(command: BenchTable) -> None:
     """Print the tables, and with --write put them where they belong."""
     grid, cells, folder = _named(command)
     name = folder.name
-    results = read_results(folder, cells)
-    said = section(name, results, grid, cells)
+    results, notes = comparable(read_results(folder, cells), cells)
+    said = section(name, results, grid, cells, notes)
     Console().print(said, highlight=False, markup=False, soft_wrap=True)
     if not command.write:
         return

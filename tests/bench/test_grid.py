@@ -86,6 +86,10 @@ def test_only_some_cells_bring_the_runs_that_they_need(tmp_path: Path) -> None:
         ("[[part]]", "[part]", "not readable TOML"),
         ('variant = "slow"', "", "two cells called|unknown"),
         ("steps = 500", "steps = 500\nshares = [1.5]", "each in 0 to 1"),
+        ('"learner.lr" = 1e-3', "seed = 3", "settings has seed, which would contradict .* write seeds ="),
+        ('"learner.lr" = 1e-3', "env_id = 'Ant-v5'", "settings has env_id, .* write tasks = "),
+        ('"learner.lr" = 1e-3', "demo-episodes = 1", "settings has demo-episodes, .* write demos = "),
+        ('"learner.lr" = 1e-3', "steps = 1", "settings has steps, .* write steps = "),
         (
             'methods = ["dac"]',
             'methods = ["airl"]',
@@ -99,6 +103,16 @@ def test_what_a_grid_cannot_be_is_said(tmp_path: Path, before: str, after: str, 
         text = text.replace('tasks = ["Walker2d-v5"]\ndemos = [1]\nseeds = [7]\n', "")
     with pytest.raises(UserError, match=complaint):
         expand(read_grid(write(tmp_path, text)))
+
+
+@pytest.mark.parametrize("other", ["steps = 2000", 'steps = 1000\nsettings = { preset = "fast" }'])
+def test_seeds_of_one_arm_differ_in_the_seed_alone(tmp_path: Path, other: str) -> None:
+    shared = '[[part]]\nmethods = ["dac"]\ntasks = ["Hopper-v5"]\ndemos = [5]\n'
+    text = f"{shared}seeds = [1]\nsteps = 1000\n{shared}seeds = [2]\n"
+    assert len(expand(read_grid(write(tmp_path, f"{text}steps = 1000\n")))) == 2
+    assert len(expand(read_grid(write(tmp_path, f'{text}{other}\nvariant = "other"')))) == 2
+    with pytest.raises(UserError, match="take for seeds of one method; give one of their parts a variant"):
+        expand(read_grid(write(tmp_path, f"{text}{other}\n")))
 
 
 def test_a_grid_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:

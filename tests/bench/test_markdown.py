@@ -2,13 +2,16 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from irl.bench.arms import arm_averages, arms_of, scorer, speed
 from irl.bench.cells import Cell, expand
+from irl.bench.comparable import comparable
 from irl.bench.estimate import all_results
 from irl.bench.figure import curves
 from irl.bench.grid import SHIPPED, Grid, read_grid
@@ -18,6 +21,7 @@ from irl.bench.statistics import Estimate
 from irl.bench.typeset import estimate
 from irl.bench.written import marks, read_part
 from irl.core.errors import UserError
+from irl.policies import shelf
 
 BENCHMARKS = Path(__file__).parents[2] / "scripts" / "benchmarks"
 DOCUMENT = (BENCHMARKS / "RESULTS.md").read_text(encoding="utf-8")
@@ -31,7 +35,8 @@ def grid_of(name: str) -> tuple[Grid | None, list[Cell]]:
 
 def rebuilt(name: str) -> str:
     grid, cells = grid_of(name)
-    return section(name, read_results(BENCHMARKS / "results" / name, cells), grid, cells)
+    results, notes = comparable(read_results(BENCHMARKS / "results" / name, cells), cells)
+    return section(name, results, grid, cells, notes)
 
 
 def test_there_are_made_parts_and_one_for_each_grid_with_results() -> None:
@@ -44,14 +49,17 @@ def test_its_numbers_are_those_of_the_json(name: str, monkeypatch: pytest.Monkey
     monkeypatch.delenv("IRL_POLICIES_PATH", raising=False)
     assert read_part(DOCUMENT, name) == rebuilt(name)
     figure = BENCHMARKS / "results" / name / "curves.svg"
-    assert figure.read_text() == curves(read_results(figure.parent, grid_of(name)[1]))
+    assert figure.read_text() == curves(
+        comparable(read_results(figure.parent, cells := grid_of(name)[1]), cells)[0]
+    )
 
 
 def test_the_summary_in_readme_is_that_of_the_json() -> None:
     grid, cells = grid_of("core")
     readme = (BENCHMARKS.parents[1] / "README.md").read_text(encoding="utf-8")
     figure = "scripts/benchmarks/results/core/curves.svg"
-    made = summary("core", read_results(BENCHMARKS / "results" / "core", cells), grid, figure)
+    results, _ = comparable(read_results(BENCHMARKS / "results" / "core", cells), cells)
+    made = summary("core", results, grid, figure)
     assert read_part(readme, "core summary") == made
 
 
@@ -86,6 +94,75 @@ def test_results_without_a_score_or_an_interval_are_shown_as_unknown() -> None:
     assert "| gail | Own | 1 | - | 5 | 2 s | - - - | - - - |" in said
     assert estimate(Estimate(0.5, math.nan, math.nan)) == ".500"
     assert estimate(Estimate(0.951, 0.9, 1.01)) == ".951 (.900 to 1.010)"
+
+
+def test_results_of_another_grid_are_left_out_and_named() -> None:
+    grid, cells = grid_of("core")
+    results = read_results(BENCHMARKS / "results" / "core", cells)
+    slower = [replace(c, steps=9) if c.name == "gail-ant-d5-s22" else c for c in cells]
+    slower = [cell for cell in slower if cell.name != "bc-ant-d5-s21"]
+    kept, notes = comparable(results, slower)
+    assert {r["file"] for r in results} - {r["file"] for r in kept} == {
+        "gail-ant-d5-s22.json",
+        "bc-ant-d5-s21.json",
+    }
+    said = section("core", kept, grid, slower, notes)
+    assert "31 of 59 cells have no result" in said
+    assert "gail-ant-d5-s22.json: steps was 1000000 and is 9" in said
+    assert "bc-ant-d5-s21.json: the grid has no such cell" in said
+    with pytest.raises(UserError, match="no result is of a cell of grid core as it is now"):
+        comparable(results[:1], cells[:1])
+
+
+def a_result(task: str, score: float, expert: float, seed: int = 1) -> dict[str, Any]:
+    return {
+        "method": "gail",
+        "task": task,
+        "seed": seed,
+        "demos": 3,
+        "demo_rate": 1,
+        "env_steps": 10,
+        "wall_s": 2.0,
+        "curve": [[10, 5.0]],
+        "command": "irl train",
+        "file": f"{seed}.json",
+        "random_return": 0.0,
+        "expert_return": expert,
+        "return_mean": score * expert,
+        "score": score,
+    }
+
+
+def test_a_task_is_scored_by_one_expert(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("IRL_POLICIES_PATH", raising=False)
+    card = shelf.find("Hopper-v5").card
+    random, expert = card.random_return_mean, card.measured.return_mean
+    now = a_result("Hopper-v5", 0.5, expert) | {"random_return": random}
+    then = a_result("Hopper-v5", 0.5, 1000.0, seed=2) | {"score_of_the_run": 0.4, "snapshot": 5}
+    found, notes = comparable([now, then], [])
+    assert found[0] == now
+    assert found[1]["score"] == pytest.approx((500 - random) / (expert - random))
+    assert (found[1]["expert_return"], found[1]["score_of_the_run"]) == (expert, None)
+    assert len(notes) == 1
+    assert f"Hopper-v5 was scored by different experts (returns of 1000 and {expert:.0f})" in notes[0]
+    assert notes[0] in section("own", found, None, [], notes)
+    assert comparable([then], []) == ([then], [])
+    # no expert is known to score both by
+    own = [a_result("Own-v0", 0.5, 10.0), a_result("Own-v0", 0.5, 20.0, seed=2)]
+    assert comparable(own, []) == (
+        own,
+        ["Scores of Own-v0 are by different experts (returns of 10 and 20): not to be compared."],
+    )
+
+
+def test_an_interval_over_few_seeds_is_called_too_narrow() -> None:
+    results = [a_result("Own-v0", 0.1 * seed, 10.0, seed) for seed in range(1, 6)]
+    doubt = "Intervals over fewer than 5 seeds a task are too narrow"
+    assert doubt in section("own", results[:4], None, [])
+    assert doubt in summary("own", results[:4], None, "curves.svg")
+    # one seed has no interval
+    for n in (1, 5):
+        assert doubt not in section("own", results[:n], None, [])
 
 
 def test_a_folder_without_results_or_with_a_damaged_one_is_refused(tmp_path: Path) -> None:

@@ -66,6 +66,20 @@ def test_a_killed_cell_goes_on_and_a_failed_one_stops_no_other() -> None:
     assert state.tries == {"a": 3, "b": 1, "c": 1}
 
 
+def test_a_result_that_cannot_be_kept_fails_its_cell_and_stops_no_other() -> None:
+    def keep(outcome: Outcome) -> None:
+        if outcome.cell.name == "a":
+            raise ValueError("Out of range float values are not JSON compliant")
+
+    state = State([cell("a"), cell("b"), cell("r", "a")])
+    play(state, Told(1), keep, lambda _: None, lambda: False)
+    assert state.done == {"b"}
+    assert state.failed == {
+        "a": "its result cannot be kept: ValueError: Out of range float values are not JSON compliant",
+        "r": "there is no reward: a failed",
+    }
+
+
 def test_what_is_killed_every_time_is_given_up() -> None:
     state, kept = played(Told(1, a=["killed"]), cell("a"), cell("b"))
     assert kept == ["b"]

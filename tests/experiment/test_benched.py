@@ -120,6 +120,12 @@ def test_a_grid_is_carried_out_once_and_its_tables_are_made_from_what_it_leaves(
     assert len([e for e in drawn.iter() if e.tag.endswith("polyline")]) == 4
     irl("bench", "table", "small.toml", *written, "--write")
     assert (Path("RESULTS.md").read_text(), Path("README.md").read_text()) == (first, readme)
+    Path("small.toml").write_text(GRID.replace("steps = 40", "steps = 60"))
+    capsys.readouterr()
+    irl("bench", "table", "small.toml", *written)
+    said = capsys.readouterr().out
+    assert "bc-pointmass-d2-s21.json: steps was 40 and is 60" in said
+    assert "| bc |" not in said
 
 
 def test_a_cell_goes_on_where_it_was_and_what_it_was_not_is_refused(
@@ -145,6 +151,30 @@ def test_a_cell_goes_on_where_it_was_and_what_it_was_not_is_refused(
     assert "was begun as another cell: steps was 512 and is 640" in capsys.readouterr().err
 
 
+def test_an_evaluation_of_half_a_run_is_made_again(
+    bench: Command, commands: list, capsys: pytest.CaptureFixture
+) -> None:
+    one, early = (
+        ("--only", "gail-pointmass-d2-s21-ppo"),
+        Path("runs/small/gail-pointmass-d2-s21/evaluation.json"),
+    )
+    bench("--only", "gail-pointmass-d2-s21")
+    result = Path("results/small/gail-pointmass-d2-s21.json")
+    before = json.loads(result.read_text())
+    half = json.loads(early.read_text()) | {"env_steps": 256}
+    early.write_text(json.dumps(half))
+    Path("results/small/gail-pointmass-d2-s21-ppo-on-100.json").unlink()
+    # the run has its result, so nobody evaluates it for the retraining
+    with pytest.raises(SystemExit):
+        bench(*one)
+    assert "evaluation.json is not of the run's last snapshot; make it again: irl evaluate" in (
+        capsys.readouterr().err
+    )
+    result.unlink()
+    bench(*one)
+    assert json.loads(result.read_text()) == before
+
+
 def test_a_cell_that_fails_is_reported_and_the_rest_goes_on(
     bench: Command, commands: list, capsys: pytest.CaptureFixture
 ) -> None:
@@ -157,6 +187,19 @@ def test_a_cell_that_fails_is_reported_and_the_rest_goes_on(
     assert [path.stem for path in Path("results/small").glob("*.json")] == ["bc-pointmass-d2-s21"]
     said = capsys.readouterr().err
     assert "irl: bc-humanoidstandup-d2-s21: no expert policy for HumanoidStandup-v5 on the shelf" in said
+
+
+def test_an_error_that_nobody_foresaw_is_its_cells_alone(
+    bench: Command, commands: list, capsys: pytest.CaptureFixture
+) -> None:
+    bench("--only", "bc-pointmass-d2-s21")
+    Path("results/small/bc-pointmass-d2-s21.json").unlink()
+    Path("runs/small/bc-pointmass-d2-s21/metrics.jsonl").unlink()
+    with pytest.raises(SystemExit) as stop:
+        bench("--only", "bc-pointmass")
+    assert stop.value.code == 1
+    assert [path.stem for path in Path("results/small").glob("*.json")] == ["bc-pointmass-d2-s22"]
+    assert "irl: bc-pointmass-d2-s21: IndexError: list index out of range" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -6,23 +6,16 @@ import numpy as np
 import plotly.graph_objects as go
 
 from irl.core.rng import stream
-from irl.core.statistics import iqm, iqm_interval
+from irl.core.statistics import FEW, iqm, iqm_interval
 from irl.report.folder import RunFiles, column, finite, lookup, number
+from irl.report.grouping import labels
 from irl.report.palette import INK, METHODS, OTHERS, faded, framed
 from irl.report.panel import Cell, Panel, Table, View, absent, plain
 from irl.report.plots import STEPS, thinned
 
 POINTS = 120
 """Steps at which a mean over seeds is taken."""
-FEW = 5
-"""Runs below which an interval over them is hardly one: of two it is the two."""
 Curve = tuple[list[float], list[float]]
-
-
-def method_of(run: RunFiles) -> str:
-    """What the run's seeds are counted with: its method and task."""
-    kind = run.evaluation.get("method") or run.config.get("kind") or "unknown"
-    return f"{kind}, {run.evaluation.get('env_id') or run.config.get('env_id') or 'unknown task'}"
 
 
 def compare(runs: Sequence[RunFiles]) -> Panel:
@@ -34,9 +27,9 @@ def compare(runs: Sequence[RunFiles]) -> Panel:
         if any(points for _, (_, points) in lines):
             views.append(View(label, (overlay(lines, unit),)))
     text = (
-        "A colour is a method on a task, a thin line a run of one seed, a thick line the interquartile mean "
-        "of a method's seeds. Runs agree where the thin lines of a colour lie together; a method is better "
-        "than another only where its whole bundle is."
+        "A colour is a method on a task with one set of settings, a thin line a run of one seed, a thick "
+        "line the interquartile mean of its seeds. Runs agree where the thin lines of a colour lie together; "
+        "a method is better than another only where its whole bundle is."
     )
     tables = (_table(runs), _by_method(runs))
     if not views and not any(run.evaluation for run in runs):
@@ -48,9 +41,10 @@ def compare(runs: Sequence[RunFiles]) -> Panel:
 
 def overlay(lines: Sequence[tuple[RunFiles, Curve]], unit: str) -> go.Figure:
     """Thin lines of all runs, and a thick one of each method that has several."""
-    drawn, colours = go.Figure(), colours_of([run for run, _ in lines])
+    of = labels([run for run, _ in lines])
+    drawn, colours = go.Figure(), colours_of([*of.values()])
     for run, (x, y) in lines:
-        method = method_of(run)
+        method = of[id(run)]
         if y:
             drawn.add_scatter(
                 x=x,
@@ -63,7 +57,7 @@ def overlay(lines: Sequence[tuple[RunFiles, Curve]], unit: str) -> go.Figure:
                 hovertemplate=f"{plain(run.name)} %{{y:.3g}}<extra></extra>",
             )
     for method, colour in colours.items():
-        mine = [curve for run, curve in lines if method_of(run) == method and curve[1]]
+        mine = [curve for run, curve in lines if of[id(run)] == method and curve[1]]
         if not mine:
             continue
         x, y = mean_of(mine)
@@ -91,10 +85,10 @@ def mean_of(curves: Sequence[Curve]) -> Curve:
     return at.tolist(), [iqm(row) for row in levels]
 
 
-def colours_of(runs: Sequence[RunFiles]) -> dict[str, str]:
+def colours_of(methods: Sequence[str]) -> dict[str, str]:
     """A colour a method; of its own where it is known, and apart where several tasks share one."""
     found: dict[str, str] = {}
-    for method in dict.fromkeys(map(method_of, runs)):
+    for method in dict.fromkeys(methods):
         own = METHODS.get(method.split(",")[0])
         free = [colour for colour in OTHERS if colour not in found.values()]
         found[method] = own if own and own not in found.values() else free[0] if free else INK
@@ -140,10 +134,11 @@ _MEASURES: Mapping[str, str] = {
 
 
 def _table(runs: Sequence[RunFiles]) -> Table:
+    of = labels(runs)
     rows: list[tuple[Cell, ...]] = [
         (
             run.name,
-            method_of(run),
+            of[id(run)],
             str(run.config.get("seed", "?")),
             *(number(run.evaluation, p) for p in _MEASURES.values()),
         )
@@ -158,8 +153,9 @@ def _table(runs: Sequence[RunFiles]) -> Table:
 
 def _by_method(runs: Sequence[RunFiles]) -> Table:
     rows: list[tuple[Cell, ...]] = []
-    for method in dict.fromkeys(map(method_of, runs)):
-        mine = [run for run in runs if method_of(run) == method]
+    of = labels(runs)
+    for method in dict.fromkeys(of.values()):
+        mine = [run for run in runs if of[id(run)] == method]
         for name, path in (
             ("score", "policy.normalised_score"),
             ("distance (VAL)", "distances.headline.value"),
