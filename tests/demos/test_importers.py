@@ -106,6 +106,27 @@ def test_no_rewards_and_no_actions(episodes, imported, tmp_path) -> None:
     np.testing.assert_array_equal(found[1].obs, episodes[1].obs)
 
 
+def test_why_episodes_end_is_asked_where_the_file_leaves_it_open(episodes, tmp_path) -> None:
+    def notes(arrays: Arrays) -> tuple[str, ...]:
+        path = write_npz(tmp_path / "a.npz", arrays)
+        return import_file(path, TASK, dataset_id="a-v0", root=tmp_path, overwrite=True)[1]
+
+    arrays = flat(episodes)
+    assert notes(arrays) == ()
+    (said,) = notes(with_ids(arrays))
+    assert "all count as cut off by a time limit; an array `terminals`" in said
+    assert all(e.truncated and not e.terminated for e in load_demos("a-v0", root=tmp_path))
+    ends = arrays["timeouts"]
+    (said,) = notes(arrays | {"terminals": ends, "timeouts": ~ends & ends})
+    assert said.startswith("all 3 episodes that the task ended by `terminals` have exactly the 30 steps")
+    assert "`dones`" in said
+    # one that ended earlier speaks for the flags
+    early = {k: v[5:] for k, v in (arrays | {"terminals": ends}).items() if k != "timeouts"}
+    assert notes(early) == ()
+    # both at once: the file tells them apart
+    assert notes(arrays | {"terminals": ends}) == ()
+
+
 def choose(obs: np.ndarray) -> np.ndarray:
     """Balances CartPole for a while."""
     return np.eye(2)[int(obs[2] + obs[3] > 0)]
