@@ -31,6 +31,21 @@ def check_at_least(config: object, least: int, *names: str) -> None:
             raise ValueError(f"{name} must be at least {least}, not {value}")
 
 
+def check_widths(config: object, *names: str) -> None:
+    """Refuse hidden layers without a unit; no hidden layers at all is a linear network.
+
+    Raises:
+        ValueError: a width is below 1; the setting is named with its widths.
+    """
+    for name in names:
+        widths = getattr(config, name)
+        if any(width < 1 for width in widths):
+            shown = " ".join(map(str, widths))
+            raise ValueError(
+                f"{name} must be widths of at least 1, not {shown}; none at all is a linear network"
+            )
+
+
 MOST_THREADS = 1024
 
 

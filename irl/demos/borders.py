@@ -21,6 +21,10 @@ from irl.demos.sources import Source
 
 CLOSE = 1e-5
 """How far a next observation may be from the next row, beside the rounding of float32."""
+NO_REASONS = (
+    "nothing says why episodes end: all count as cut off by a time limit; an array `terminals` says where "
+    "the task ended them"
+)
 _ONE_EACH = ("rewards", "terminated", "truncated", "episode", "step", "starts")
 
 
@@ -58,6 +62,8 @@ def split_episodes(source: Source) -> Split:
     if dropped:
         notes.append(_left_out(arrays, bounds))
         bounds = [(start, stop - 1) for start, stop in bounds]
+    if not {"terminated", "truncated"} & arrays.keys():
+        notes.append(NO_REASONS)
     if source.unused:
         notes.append(f"not used: {', '.join(source.unused)}")
     episodes = [

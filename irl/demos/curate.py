@@ -41,11 +41,16 @@ def merge(
     datasets = [open_dataset(name, root, tuple(obs_keys)) for name in dataset_ids]
     first = datasets[0]
     for other in datasets[1:]:
-        for what in ("env_id", "obs_space", "action_space"):
+        # another reward or other dynamics are arguments of the same id
+        for what, word in (
+            ("env_name", "task"),
+            ("obs_space", "obs_space"),
+            ("action_space", "action_space"),
+        ):
             a, b = getattr(first, what), getattr(other, what)
             if a != b:
                 raise UserError(
-                    f"{first.dataset_id} has the {what} {a}, {other.dataset_id} has {b}; merge datasets of "
+                    f"{first.dataset_id} has the {word} {a}, {other.dataset_id} has {b}; merge datasets of "
                     f"one task"
                 )
     episodes = [episode for dataset in datasets for episode in read_episodes(dataset, root)]

@@ -60,7 +60,20 @@ def import_file(
         write(target, dataset_id, root, episodes, origin_of(env), labels)
     finally:
         env.close()
-    return show(dataset_id, root), split.notes
+    return show(dataset_id, root), split.notes + _doubts(episodes, env_id, env)
+
+
+def _doubts(episodes: list[Episode], env_id: str, env: gym.Env) -> tuple[str, ...]:
+    """A note where what says that the task ended the episodes fits a time limit better."""
+    limit = env.spec.max_episode_steps if env.spec is not None else None
+    ended = [len(episode) for episode in episodes if episode.terminated and not episode.truncated]
+    if not ended or any(steps != limit for steps in ended):
+        return ()
+    return (
+        f"all {len(ended)} episodes that the task ended by `terminals` have exactly the {limit} steps that "
+        f"{env_id} is cut off after: these look like ends of any kind (`dones`); if they are, call the array "
+        f"`timeouts` and import with --overwrite, or else a reward is learned as if the task had ended there",
+    )
 
 
 def _episode(columns: Columns, index: int, env_id: str, env: gym.Env, state_only: bool) -> Episode:

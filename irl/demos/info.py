@@ -21,6 +21,8 @@ class DemosInfo:
 
     dataset_id: str
     env_id: str | None
+    env_name: str | None
+    """The task's full name: the id with the arguments that make it a variant."""
     path: Path
     episodes: int
     steps: int
@@ -61,6 +63,7 @@ def show(dataset_id: str, root: Path | str | None = None, obs_keys: Sequence[str
     return DemosInfo(
         dataset_id=dataset_id,
         env_id=dataset.env_id,
+        env_name=dataset.env_name,
         path=dataset.path,
         episodes=len(episodes),
         steps=sum(lengths),
@@ -91,7 +94,7 @@ def table(info: DemosInfo) -> Table:
     found = Table(show_header=False, title=info.dataset_id)
     paid = f"{info.return_mean:.1f} ± {info.return_std:.1f}"
     rows = {
-        "task": info.env_id or "unknown",
+        "task": info.env_name or "unknown",
         "episodes": f"{info.episodes} of {info.length_min} to {info.length_max} steps, {info.steps:,} in all",
         "return": "not recorded" if np.isnan(info.return_mean) else paid,
         "reference returns": f"random {_number(info.random_return)}, expert {_number(info.expert_return)}",

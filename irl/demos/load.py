@@ -12,7 +12,9 @@ from irl.core.errors import UserError
 from irl.core.rng import stream
 from irl.core.types import Episode
 from irl.demos.bounds import first_outside
+from irl.demos.metadata import env_name
 from irl.demos.storage import open_dataset, read_episodes
+from irl.demos.write import origin_of
 from irl.envs.tasks import task_of
 
 
@@ -32,6 +34,8 @@ class Demos(Sequence[Episode]):
     """Mean return of random actions, the zero of a normalised score."""
     expert_return: float | None
     """Mean return of the expert, the one of a normalised score."""
+    env_name: str | None = None
+    """The task's full name (`irl.envs.names`): the id with the arguments that make it a variant."""
 
     def __len__(self) -> int:
         return len(self.episodes)
@@ -92,6 +96,7 @@ def load_demos(
         path=dataset.path,
         random_return=dataset.random_return,
         expert_return=dataset.expert_return,
+        env_name=dataset.env_name,
     )
 
 
@@ -129,6 +134,21 @@ def check_task(demos: Demos, env: gym.Env, *, seen: bool = True) -> None:
         )
     if has[1]:
         _check_actions(demos, wanted, env.action_space)
+
+
+def other_variant(demos: Demos, env: gym.Env) -> str | None:
+    """A line where the demonstrations are of `env`'s task with other arguments; None where they are not.
+
+    They are not refused: learning across rewards or dynamics is a question of its own.
+    """
+    wanted = env_name(origin_of(env).env_spec)
+    same_id = env.spec is not None and demos.env_id == env.spec.id
+    if not same_id or demos.env_name == wanted:
+        return None
+    return (
+        f"demonstrations {demos.dataset_id} are of {demos.env_name:.300}, training is in {wanted:.300}; "
+        f"where that is not meant, name the demonstrations' arguments with --env-kwargs"
+    )
 
 
 def _check_actions(demos: Demos, wanted: str, space: gym.Space) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import minari
 from gymnasium.envs.registration import parse_env_id
 from gymnasium.spaces import Box, Dict, Discrete
@@ -18,6 +19,7 @@ from irl.demos.episodes import Layout
 from irl.demos.recording import Recorded
 from irl.envs.flatten import flat_space
 from irl.envs.make import check_flat
+from irl.envs.names import full_name
 from irl.envs.tasks import task_of
 
 METADATA = "metadata.json"
@@ -43,8 +45,10 @@ class Dataset:
     action_space: Box | Discrete
     episodes: int
     env_id: str | None
+    env_name: str | None
+    """The task's full name (`irl.envs.names`): the id with the arguments that make it a variant."""
     env_spec: str | None
-    """Gymnasium's own words on the environment; nothing but the id is ever used of them."""
+    """Gymnasium's own words on the environment; of them the id and the arguments are read, as data."""
     algorithm: str | None
     author: str | None
     description: str | None
@@ -93,6 +97,7 @@ def parse(dataset_id: str, path: Path, content: Any, obs_keys: tuple[str, ...]) 
         action_space=_action_space(metadata),
         episodes=from_json(int, metadata.get("total_episodes"), f"{METADATA}.total_episodes"),
         env_id=_env_id(spec := optional(str, "env_spec")),
+        env_name=env_name(spec),
         env_spec=spec,
         algorithm=optional(str, "algorithm_name"),
         author=_author(metadata.get("author")),
@@ -147,3 +152,21 @@ def _env_id(spec: str | None) -> str | None:
         raise ValueError(f"env_spec names the environment {env_id!r:.80}; expected an id without a module")
     parse_env_id(env_id)
     return env_id
+
+
+def env_name(spec: str | None) -> str | None:
+    """The full name of the task that an `env_spec` is of; its arguments are compared and shown, never used.
+
+    Raises:
+        UserError, ValueError: it is no JSON, names no id that is one, or its arguments are no object.
+    """
+    if spec is None or (env_id := _env_id(spec)) is None:
+        return None
+    given = from_json(dict[str, Any], json.loads(spec).get("kwargs", {}), "env_spec.kwargs")
+    # gymnasium writes the arguments of the registration down too, and those are the id's own
+    own = gym.registry[env_id].kwargs if env_id in gym.registry else {}
+    usual = {name: json.dumps(value, default=str) for name, value in own.items()}
+    # how it is looked at is no part of the task
+    usual["render_mode"] = json.dumps(given.get("render_mode"))
+    shown = {name: value for name, value in given.items() if json.dumps(value) != usual.get(name)}
+    return full_name(env_id, (json.dumps(shown),))

@@ -97,13 +97,22 @@ def _named(path: Path, found: Mapping[str, np.ndarray]) -> Source:
     for name, values in found.items():
         meaning = _MEANING.get(name)
         if info := _INFO.fullmatch(name):
-            infos[info[1]] = values
+            # one number for the whole file is about no step
+            if values.ndim:
+                infos[info[1]] = values
+            else:
+                unused.append(name)
         elif meaning is None:
             unused.append(name)
         elif meaning in arrays:
             raise UserError(f"{path} has several arrays of {meaning}, {name} is one; leave one away")
         elif values.dtype.kind not in "fiub":
             raise UserError(f"{path} has {name} of {values.dtype}; expected numbers")
+        elif not values.ndim:
+            raise UserError(
+                f"{path} has {name} as the single value {values}; expected an array with one for each step: "
+                f"leave it away, or repeat it"
+            )
         else:
             arrays[meaning] = values
     if "obs" not in arrays:

@@ -77,9 +77,17 @@ def origin_of(env: gym.Env) -> Origin:
         except (ValueError, TypeError):
             steps = spec.max_episode_steps
             bare = {"id": spec.id, "entry_point": None, "max_episode_steps": steps, "additional_wrappers": []}
-            text = json.dumps(bare)
+            text = json.dumps(bare | {"kwargs": _written(spec.kwargs)})
     env_id = spec.id if spec is not None else None
     return Origin(env.observation_space, env.action_space, env_id, text, tuple(requirements))
+
+
+def _written(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments as JSON, so that a variant is known by them; none where one of them is not."""
+    try:
+        return json.loads(json.dumps(arguments))
+    except (ValueError, TypeError):
+        return {}
 
 
 def check_target(dataset_id: str, root: Path | str | None, overwrite: bool) -> Path:

@@ -29,7 +29,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from irl.core.config import check_at_least
+from irl.core.config import check_at_least, check_widths
 from irl.core.nets import Normaliser
 from irl.core.schedule import rate_at
 from irl.core.types import Metrics, Transitions
@@ -82,6 +82,7 @@ class AIRLConfig(SwitchesConfig):
         super().__post_init__()
         check_defined(self.loss, self.mixup, self.inputs)
         check_at_least(self, 0, "lr", "gradient_penalty", "reward_penalty", "potential_penalty")
+        check_widths(self, "hidden", "potential_hidden")
         for name in ("absorbing_scale", "log_pi_bound"):
             if (value := getattr(self, name)) <= 0:
                 raise ValueError(f"{name} must be above 0, not {value}")

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from irl.core import adam
-from irl.core.config import check_at_least
+from irl.core.config import check_at_least, check_widths
 from irl.core.nets import Normaliser
 from irl.core.schedule import rate_at
 from irl.core.types import Metrics, Transitions
@@ -81,6 +81,7 @@ class GAILConfig(SwitchesConfig):
         super().__post_init__()
         check_at_least(self, 0, "lr", "gradient_penalty", "penalty_center", "entropy", "absorbing_scale")
         check_at_least(self, 1, "penalty_every")
+        check_widths(self, "hidden")
         if self.loss == "wasserstein":
             check_critic(self.reward_map, self.entropy, bool(self.gradient_penalty or self.spectral_norm))
 

@@ -48,12 +48,18 @@ class OneHot(Box):
     def row(self, wanted: np.ndarray) -> np.ndarray:
         """The row that a policy's answer comes to: a choice, or numbers of which the largest counts.
 
-        Numbers that are not finite come back as they are, for whoever checks them.
+        Rows of numbers that are not finite come back as they are, for whoever checks them.
 
         Raises:
-            ValueError: the answer has another shape, or is no choice of the space.
+            ValueError: the answer is a single number that is no choice of the space.
         """
         if wanted.shape == ():
+            # not cut to one: a policy for numbers would be taken for one that always chooses the first
+            if not float(wanted).is_integer():
+                raise ValueError(
+                    f"expected a choice of {self.choices}, a whole number, or a row of {self.choices.n} "
+                    f"numbers; the policy gave {wanted}"
+                )
             return self.rows(wanted.reshape(1).astype(np.int64))[0]
         if wanted.shape != self.shape or not np.isfinite(wanted).all():
             return wanted

@@ -23,15 +23,24 @@ def rollout(env: gym.Env, act: ActFn, seed: int) -> Episode:
     and the row's infos recorded, another environment every scalar number that each step's info has.
 
     Raises:
-        ValueError: an action has the wrong shape or is not finite.
+        ValueError: actions are no Box (`irl.envs.make.make` makes one of a choice); or one has the wrong
+            shape or is not finite.
     """
     return record(env, act, seed)[0]
 
 
 def record(env: gym.Env, act: ActFn, seed: int) -> tuple[Episode, dict[str, float]]:
-    """The episode of `rollout`, and the scalar numbers in the info of its reset (e.g. `x_position`)."""
+    """The episode of `rollout`, and the scalar numbers in the info of its reset (e.g. `x_position`).
+
+    Raises:
+        ValueError: actions are no Box; or one has the wrong shape or is not finite.
+    """
     space = env.action_space
-    assert isinstance(space, Box)
+    if not isinstance(space, Box):
+        raise ValueError(
+            f"expected an environment whose actions are a Box, not {space}; irl.envs.make.make(ENV_ID) makes "
+            f"one of a choice of actions"
+        )
     low, high, dtype = space.low, space.high, space.dtype
     start, reset_info = env.reset(seed=seed)
     # copies, here and below: an environment may return the same buffers at every step

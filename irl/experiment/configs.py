@@ -8,7 +8,7 @@ from irl.algorithms.adversarial import ReplayedScheduleConfig, ScheduleConfig
 from irl.algorithms.bc import CloningConfig
 from irl.algorithms.interleaved import InterleavedConfig
 from irl.core import products
-from irl.core.config import check_at_least, check_seed, check_threads
+from irl.core.config import check_at_least, check_seed, check_threads, check_widths
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
@@ -155,6 +155,7 @@ class ClonedConfig(CloningConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_at_least(self, 1, "steps_per_round")
+        check_widths(self, "hidden")
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Which demonstrations a run learns from: drawn once, written down, and the same ever after."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ from gymnasium.spaces import Box
 from irl.core import files
 from irl.core.errors import UserError
 from irl.core.records import RunFolder
-from irl.demos.load import Demos, check_task, load_demos
+from irl.demos.load import Demos, check_task, load_demos, other_variant
 from irl.discriminators.airl import AIRLConfig
 from irl.envs.flatten import OBS_KEYS
 from irl.envs.make import check_module, make
@@ -21,15 +22,15 @@ RECORD = "demonstrations.json"
 
 
 def draw(config: FromDemonstrations) -> Demos:
-    """The demonstrations that the settings name.
+    """The demonstrations that the settings name; a line on stderr where they are of a variant of the task.
 
     Raises:
         UserError: there are none, too few, or they are of another task; or the task cannot be started.
     """
-    return _drawn_of(config, config.datasets_root)
+    return _drawn_of(config, config.datasets_root, warn=True)
 
 
-def _drawn_of(config: FromDemonstrations, root: Path | None) -> Demos:
+def _drawn_of(config: FromDemonstrations, root: Path | None, *, warn: bool = False) -> Demos:
     """The demonstrations, once they are known to be of the task and the task is known to start."""
     env = make(config.env_id)
     try:
@@ -43,6 +44,8 @@ def _drawn_of(config: FromDemonstrations, root: Path | None) -> Demos:
         assert isinstance(box, Box)
         action = demos[0].action[0] if demos[0].action.shape[1] else (box.low + box.high) / 2
         env.step(action.astype(box.dtype))
+        if warn and (line := other_variant(demos, env)) is not None:
+            print(f"irl: {line}", file=sys.stderr)
         return demos
     finally:
         env.close()

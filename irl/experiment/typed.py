@@ -2,6 +2,8 @@
 
 import contextlib
 import io
+import math
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import tyro
@@ -15,19 +17,37 @@ def parsed(cls: type, words: list[str], program: str) -> Any:
     """The command that the words say.
 
     Raises:
-        UserError: tyro's boxed complaint as one line.
+        UserError: tyro's boxed complaint as one line, or a number is not finite.
         SystemExit: help was asked for, and printed.
     """
     default = _default(cls, words)
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            return tyro.cli(cls, args=words, prog=program, **({"default": default} if default else {}))
+            found = tyro.cli(cls, args=words, prog=program, **({"default": default} if default else {}))
     except SystemExit as stop:
         if stop.code in (0, None):
             raise
         frame = str.maketrans(dict.fromkeys("╭╮╰╯│─┌┐└┘", " "))
         raise UserError(complaint.getvalue().translate(frame)) from None
+    _check_finite(found, "")
+    return found
+
+
+def _check_finite(value: Any, name: str) -> None:
+    """Refuse nan and infinity wherever they are: comparisons let them by, and no JSON has them.
+
+    Raises:
+        UserError: names the setting as it is typed.
+    """
+    if is_dataclass(value):
+        for field in fields(value):
+            _check_finite(getattr(value, field.name), f"{name}.{field.name}".lstrip("."))
+    elif isinstance(value, tuple | list):
+        for item in value:
+            _check_finite(item, name)
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise UserError(f"--{name.replace('_', '-')} is {value}; expected a finite number")
 
 
 def _default(cls: type, words: list[str]) -> Any:

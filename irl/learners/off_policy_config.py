@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from irl.core.config import check_at_least
+from irl.core.config import check_at_least, check_widths
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class OffPolicyConfig:
     def __post_init__(self) -> None:
         check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "buffer_size", "n_critics")
         check_at_least(self, 0, "learning_starts", "lr", "tau", "updates_per_step", "reward_clip")
+        check_widths(self, "hidden")
         if self.steps_per_round % self.n_envs:
             raise ValueError(
                 f"steps_per_round must be a multiple of n_envs ({self.n_envs}), not {self.steps_per_round}"

@@ -22,7 +22,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
-from irl.core.config import check_at_least
+from irl.core.config import check_at_least, check_widths
 from irl.core.finite import check_finite, named
 from irl.core.nets import ACTIVATIONS, Normaliser
 from irl.core.schedule import learning_rate, rate_at
@@ -109,7 +109,13 @@ class PPOConfig:
 
     def __post_init__(self) -> None:
         check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "n_epochs")
-        check_at_least(self, 0, "lr", "clip_range", "vf_coef", "max_grad_norm", "reward_clip")
+        check_at_least(self, 0, "lr", "clip_range", "vf_coef", "reward_clip")
+        check_widths(self, "hidden")
+        if self.max_grad_norm <= 0.0:
+            # 0 would clip every gradient away
+            raise ValueError(f"max_grad_norm must be above 0, not {self.max_grad_norm}")
+        if not 0.0 <= self.gae_lambda <= 1.0:
+            raise ValueError(f"gae_lambda must be in [0, 1], not {self.gae_lambda}")
         for name in ("clip_range_vf", "target_kl"):
             if (value := getattr(self, name)) is not None and value <= 0.0:
                 raise ValueError(f"{name} must be above 0, or None, not {value}")

@@ -9,6 +9,9 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Float
+
 from irl.core import files
 from irl.core.errors import UserError
 from irl.envs.tasks import task_name
@@ -26,6 +29,10 @@ class Shelved:
     policy: Policy
     card: Card
     path: Path
+
+    def __call__(self, obs: Float[np.ndarray, "O"]) -> Float[np.ndarray, "A"]:
+        """The policy's action: it is played as it is, without taking it out first."""
+        return self.policy(obs)
 
 
 def roots(root: Path | None = None) -> list[Path]:

@@ -95,10 +95,9 @@ def load_reward(path: Path | str, part: str | None = None, *, average: bool = Fa
 
 
 def _average(run: Path, part: str | None) -> LearnedReward:
-    folders = {int(f.parent.name): f for f in run.glob("snapshots/*/reward") if f.parent.name.isdigit()}
-    if not folders:
+    if not (folders := _snapshots(run)):
         raise UserError(f"no rewards to average in {run}: expected a run with {run / 'snapshots'}")
-    used = so_far(dict(sorted(folders.items())), max(folders))
+    used = so_far(folders, max(folders))
     return averaged([load_reward(folder, part) for folder in used.values()])
 
 
@@ -181,9 +180,14 @@ def _check_weights(spec: Spec, weights: dict[str, Tensor]) -> None:
         )
 
 
+def _snapshots(run: Path) -> dict[int, Path]:
+    """The rewards of a run by environment step, the last one last; a folder of another name is none."""
+    found = (folder for folder in run.glob("snapshots/*/reward") if folder.parent.name.isdecimal())
+    return dict(sorted((int(folder.parent.name), folder) for folder in found))
+
+
 def _reward_folder(path: Path) -> Path:
-    snapshots = sorted((path / "snapshots").glob("*/reward")) if (path / "snapshots").is_dir() else []
-    for folder in (path, path / "reward", *snapshots[-1:]):
+    for folder in (path, path / "reward", *list(_snapshots(path).values())[-1:]):
         if (folder / SPEC).is_file():
             return folder
     raise UserError(f"no reward in {path}: expected {path / SPEC}, {path / 'reward' / SPEC} or snapshots")

@@ -18,6 +18,7 @@ from irl.discriminators.gail import GAILConfig
 from irl.experiment.configs import (
     AIRLRun,
     BCRun,
+    ClonedConfig,
     DACRun,
     DACTD3Run,
     ExpertRun,
@@ -284,3 +285,22 @@ def test_every_setting_that_was_added_is_one_and_of_its_type() -> None:
         for name, value in added.items():
             assert to_json(getattr(read, name)) == value
     assert seen > 20
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        (PPOConfig, "hidden"),
+        (SACConfig, "hidden"),
+        (ClonedConfig, "hidden"),
+        (GAILConfig, "hidden"),
+        (DACConfig, "hidden"),
+        (AIRLConfig, "hidden"),
+        (AIRLConfig, "potential_hidden"),
+    ],
+)
+def test_a_layer_without_units_is_refused_and_no_layer_is_not(kind: type, name: str) -> None:
+    for widths in ((0,), (64, -1)):
+        with pytest.raises(ValueError, match=f"{name} must be widths of at least 1, not {widths[0]}"):
+            kind(**{name: widths})
+    assert getattr(kind(**{name: ()}), name) == ()

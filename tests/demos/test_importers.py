@@ -106,6 +106,33 @@ def test_no_rewards_and_no_actions(episodes, imported, tmp_path) -> None:
     np.testing.assert_array_equal(found[1].obs, episodes[1].obs)
 
 
+def test_an_info_of_the_whole_file_is_not_used(episodes, tmp_path) -> None:
+    path = write_npz(tmp_path / "a.npz", flat(episodes) | {"infos/k": np.array(3.0), "infos/j": np.zeros(90)})
+    info, notes = import_file(path, TASK, dataset_id="a-v0", root=tmp_path)
+    assert (info.infos, notes) == (("j",), ("not used: infos/k",))
+
+
+def test_why_episodes_end_is_asked_where_the_file_leaves_it_open(episodes, tmp_path) -> None:
+    def notes(arrays: Arrays) -> tuple[str, ...]:
+        path = write_npz(tmp_path / "a.npz", arrays)
+        return import_file(path, TASK, dataset_id="a-v0", root=tmp_path, overwrite=True)[1]
+
+    arrays = flat(episodes)
+    assert notes(arrays) == ()
+    (said,) = notes(with_ids(arrays))
+    assert "all count as cut off by a time limit; an array `terminals`" in said
+    assert all(e.truncated and not e.terminated for e in load_demos("a-v0", root=tmp_path))
+    ends = arrays["timeouts"]
+    (said,) = notes(arrays | {"terminals": ends, "timeouts": ~ends & ends})
+    assert said.startswith("all 3 episodes that the task ended by `terminals` have exactly the 30 steps")
+    assert "`dones`" in said
+    # one that ended earlier speaks for the flags
+    early = {k: v[5:] for k, v in (arrays | {"terminals": ends}).items() if k != "timeouts"}
+    assert notes(early) == ()
+    # both at once: the file tells them apart
+    assert notes(arrays | {"terminals": ends}) == ()
+
+
 def choose(obs: np.ndarray) -> np.ndarray:
     """Balances CartPole for a while."""
     return np.eye(2)[int(obs[2] + obs[3] > 0)]
@@ -218,6 +245,9 @@ WRONG: dict[str, tuple[Callable[[Arrays], Arrays], str]] = {
     "no observations": (changed(observations=None), "no array 'observations'; it has 'actions'"),
     "nothing": (lambda a: {k: v[:0] for k, v in a.items()}, "no rows"),
     "two of one meaning": (changed(obs=np.zeros((90, 2))), "several arrays of obs"),
+    "one timeout for all": (changed(timeouts=np.array(False)), "timeouts as the single value False"),
+    "one reward for all": (changed(rewards=np.array(1.5)), "rewards as the single value 1.5; .* each step"),
+    "one observation": (changed(observations=np.array(0.0)), "observations as the single value 0.0"),
     "text": (changed(actions=np.array(["left"] * 90)), "actions of <U4; expected numbers"),
 }
 

@@ -20,6 +20,9 @@ def test_rows_and_choices() -> None:
     np.testing.assert_array_equal(space.chosen(rows), [7, 5])
     np.testing.assert_array_equal(space.row(np.array([0.1, 3.0, -2.0])), [0, 1, 0])
     np.testing.assert_array_equal(space.row(np.asarray(6.0)), [0, 1, 0])
+    for wrong in (6.7, -0.5, np.nan, np.inf):
+        with pytest.raises(ValueError, match=f"a whole number, .* 3 numbers; the policy gave {wrong}"):
+            space.row(np.asarray(wrong))
     for wrong in (4, 8):
         with pytest.raises(ValueError, match=f"the action {wrong} at step 1 is none of 5 to 7"):
             space.rows(np.array([5, wrong]))

@@ -115,3 +115,10 @@ def test_an_unknown_environment_keeps_the_numbers_that_every_step_has():
     assert episode.terms == {}
     assert (episode.terminated, episode.truncated) == (False, True)
     assert at_reset.keys() == {"count"}
+
+
+def test_a_choice_of_actions_is_refused_with_what_makes_rows_of_it():
+    env = gym.make("CartPole-v1")
+    with pytest.raises(ValueError, match=r"a Box, not Discrete\(2\); irl\.envs\.make\.make"):
+        rollout(env, lambda obs: np.asarray(1), seed=0)
+    env.close()

@@ -43,6 +43,18 @@ MISTAKES = {
         f"experts evaluate --env-id {TASK} --level medium",
         ["medium", "irl experts train"],
     ),
+    "a bound without end": (
+        f"train gail --env-id {TASK} --learner.max-grad-norm inf --out run",
+        ["--learner.max-grad-norm is inf; expected a finite number"],
+    ),
+    "a rate that is no number": (
+        f"train gail --env-id {TASK} --learner.lr nan --out run",
+        ["--learner.lr is nan; expected a finite number"],
+    ),
+    "a least return of nothing": (
+        f"demos generate --env-id {TASK} --min-return=-inf",
+        ["--min-return is -inf; expected a finite number"],
+    ),
     "no steps": (f"train gail --env-id {TASK} --steps 0 --out run", ["steps", "0"]),
     "settings that contradict": (
         f"train gail --env-id {TASK} --learner.n-envs 3 --out run",

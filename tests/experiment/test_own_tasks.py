@@ -262,3 +262,24 @@ def test_parts_of_observations_in_a_dictionary_are_shown_split_and_merged(
         with pytest.raises(SystemExit):
             irl("demos", *words)
         assert said in capfd.readouterr().err
+
+
+def test_demonstrations_of_a_variant_are_learned_from_with_a_word(
+    irl: Command, home: Path, tmp_path: Path, capfd: pytest.CaptureFixture
+) -> None:
+    expert, root = (
+        home / "policies" / "pointmass" / "expert" / "policy.safetensors",
+        ("--datasets-root", "ds"),
+    )
+    one = ("--env-id", TASK, "--env-kwargs", "good=3", "--policy", expert, "--episodes", "2")
+    irl("demos", "generate", *one, "--dataset-id", "near-v0", *root)
+    assert 'PointMass-v0?{"good":3}' in capfd.readouterr().out
+    near = ("train", "bc", "--env-id", TASK, "--demos", "near-v0", "--demo-episodes=1", "--steps=2", *root)
+    said = (
+        f'irl: demonstrations near-v0 are of {TASK}?{{"good":3}}, training is in {TASK}; where that is not '
+        f"meant, name the demonstrations' arguments with --env-kwargs"
+    )
+    irl(*near, "--out", "plain")
+    assert capfd.readouterr().err.splitlines().count(said) == 1
+    irl(*near, "--env-kwargs", "good=3", "--out", "same")
+    assert "irl: " not in capfd.readouterr().err

@@ -9,6 +9,8 @@ import pytest
 
 from irl.core.errors import UserError
 from irl.core.types import ActFn
+from irl.envs.make import make
+from irl.envs.rollouts import rollout
 from irl.policies import shelf
 from irl.policies.card import Card, measure, read_card
 from irl.policies.policy import Policy, load_policy, save_policy
@@ -101,6 +103,10 @@ def test_what_was_written_is_found_again(nowhere: Path) -> None:
     assert found.card == read_card(folder / shelf.CARD)
     assert found.policy.spec.env_id == "PointMass-v0"
     np.testing.assert_array_equal(found.policy(np.array([0.1, -3.0])), [-0.5, 1.0])
+    # as it comes, it is played
+    env = make("PointMass-v0")
+    np.testing.assert_array_equal(rollout(env, found, 3).obs, rollout(env, found.policy, 3).obs)
+    env.close()
     assert sorted(path.name for path in folder.iterdir()) == [shelf.CARD, shelf.POLICY]
 
 

@@ -153,6 +153,11 @@ def test_a_snapshot_and_a_run_are_places_of_a_reward(tmp_path: Path) -> None:
     assert last.spec.env_steps == 20_000
     with torch.no_grad():
         assert torch.equal(last.logits(batch()), a_net(2)(batch()))
+    # a copy of somebody's, and names of another width
+    for name in ("backup", "9000"):
+        place = tmp_path / "snapshots" / name / "reward"
+        save_reward(place, replace(REWARD, env_steps=7), a_net(3))
+    assert load_reward(tmp_path).spec.env_steps == 20_000
 
 
 @pytest.mark.parametrize("below", [".", "nowhere"])
