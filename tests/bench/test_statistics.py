@@ -103,3 +103,18 @@ def test_steps_to_are_of_the_first_evaluation_that_is_there() -> None:
     assert middle([]) is None
     assert middle([10.0, 20.0, None]) == 20.0
     assert middle([10.0, None]) is None
+
+
+@pytest.mark.parametrize(("tasks", "held"), [(5, 0.85), (1, 0.75)])
+def test_intervals_over_three_seeds_hold_the_mean_as_seldom_as_the_tables_say(
+    tasks: int, held: float
+) -> None:
+    rng = np.random.default_rng(0)
+    inside = []
+    for _ in range(600):
+        _, mean = averages([rng.normal(size=3) for _ in range(tasks)], rng, draws=400)
+        assert mean.low is not None
+        assert mean.high is not None
+        inside.append(mean.low <= 0.0 <= mean.high)
+    # four standard errors
+    assert np.mean(inside) == pytest.approx(held, abs=4 * (held * (1 - held) / 600) ** 0.5)
