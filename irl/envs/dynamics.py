@@ -90,18 +90,18 @@ def change(root: ET.Element, changes: Mapping[str, float]) -> None:
             if option is None:
                 option = ET.SubElement(root, "option")
             option.set("gravity", option.get("gravity", "0 0 -9.81"))
-            _check_something(name, [option])
+            _check_not_zero(name, [option])
             _multiply(option, "gravity", factor, every=True)
         elif name == "friction":
             _scale(root, "geom", "friction", 1.0, factor)
         elif name == "damping":
-            _check_something(name, root.iter("joint"))
+            _check_not_zero(name, root.iter("joint"))
             _scale(root, "joint", "damping", 0.0, factor)
         elif name == LEGS:
             _disable(root, int(factor))
 
 
-def _check_something(name: str, elements: Iterable[ET.Element]) -> None:
+def _check_not_zero(name: str, elements: Iterable[ET.Element]) -> None:
     if not any(float(word) for element in elements for word in element.get(name, "0").split()):
         raise UserError(f"the model's {name} is 0, and a factor leaves it at that; choose another change")
 

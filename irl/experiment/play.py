@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -202,17 +202,7 @@ class Player:
         last, every = round_.env_steps >= self.steps, self.watch.eval_every
         if self.watch.eval_episodes == 0 or not (last or (every and round_.index % every == 0)):
             return {}
-        episodes = rollouts(self.env_id, self.algorithm.learner.policy(), self._eval_seeds)
-        returns = np.array([episode.return_ for episode in episodes])
-        seen = {
-            "eval_return_mean": float(returns.mean()),
-            "eval_return_stderr": float(standard_errors([returns])[0]),
-            "eval_length_mean": float(np.mean([len(episode) for episode in episodes])),
-        }
-        if self.reward is not None:
-            learned = [given.sum() for given in read_episodes(self.reward, episodes)]
-            seen["eval_learned_return_mean"] = float(np.mean(learned))
-        return seen
+        return evaluated(self.env_id, self.algorithm.learner.policy(), self._eval_seeds, self.reward)
 
     def _snapshots(self, due: list[int]) -> list[int]:
         """Take the snapshot that is due, if one is; return those that are not yet."""
@@ -234,6 +224,21 @@ class Player:
         self.folder.save_checkpoint(self.algorithm.learner.env_steps, content)
         self._last_save_s = time.monotonic() - began
         self._checkpoint_s += self._last_save_s
+
+
+def evaluated(env_id: str, policy: Policy, seeds: Sequence[int], reward: RewardFn | None) -> Metrics:
+    """What a row of metrics.jsonl has of a policy in these episodes; by `reward` too where there is one."""
+    episodes = rollouts(env_id, policy, seeds)
+    returns = np.array([episode.return_ for episode in episodes])
+    seen = {
+        "eval_return_mean": float(returns.mean()),
+        "eval_return_stderr": float(standard_errors([returns])[0]),
+        "eval_length_mean": float(np.mean([len(episode) for episode in episodes])),
+    }
+    if reward is not None:
+        learned = [given.sum() for given in read_episodes(reward, episodes)]
+        seen["eval_learned_return_mean"] = float(np.mean(learned))
+    return seen
 
 
 @contextmanager

@@ -14,14 +14,13 @@ from irl.core import files
 from irl.core.records import RunFolder
 from irl.core.rng import episode_seeds
 from irl.core.types import Episode
-from irl.diagnostics.overoptimisation import standard_errors
 from irl.diagnostics.stack import read_episodes
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import RetrainRun
 from irl.experiment.frozen import RECORD
 from irl.experiment.judge import finite
 from irl.experiment.overoptimised import over_run
-from irl.experiment.play import EVALUATION
+from irl.experiment.play import EVALUATION, evaluated
 from irl.experiment.progress import each_episode, progress
 from irl.policies import shelf
 from irl.policies.card import Card, normalised_score, summary
@@ -67,24 +66,16 @@ def _over_training(
 ) -> dict[str, Any]:
     """Both returns from random weights on, at the evaluations: here the proxy is one reward all along."""
     names = ("env_steps", "eval_learned_return_mean", "eval_return_mean", "eval_return_stderr")
-    rows = [tuple(row.get(name) for name in names) for row in folder.metrics()]
-    known = [row for row in rows if None not in row]
-    if known:
-        known.insert(0, _at_first(config, folder, reward))
+    n, rows = config.watch.eval_episodes, folder.metrics()
+    if n:
+        # of the policy that nothing had taught yet
+        step, first = next(iter(folder.snapshots().items()))
+        policy, seeds = load_policy(first / "policy.safetensors"), episode_seeds(config.seed, EVALUATION, n)
+        rows = [{"env_steps": step, **evaluated(config.env_id, policy, seeds, reward)}, *rows]
+    columns = [[row.get(name) for name in names] for row in rows]
+    known = [row for row in columns if None not in row]
     steps, proxy, gold, error = zip(*known, strict=True) if known else ((), (), (), ())
     return over_run(steps, proxy, gold, np.array(error, float), floor=floor)[0]
-
-
-def _at_first(
-    config: RetrainRun, folder: RunFolder, reward: LearnedReward
-) -> tuple[int, float, float, float]:
-    """The same numbers of the policy that nothing had taught yet, in the episodes of the evaluations."""
-    steps, first = next(iter(folder.snapshots().items()))
-    seeds = episode_seeds(config.seed, EVALUATION, config.watch.eval_episodes)
-    episodes = rollouts(config.env_id, load_policy(first / "policy.safetensors"), seeds)
-    returns = np.array([episode.return_ for episode in episodes])
-    learned = float(np.mean([given.sum() for given in read_episodes(reward, episodes)]))
-    return steps, learned, float(returns.mean()), float(standard_errors([returns])[0])
 
 
 def _true(episodes: Sequence[Episode], card: Card | None) -> dict[str, Any]:

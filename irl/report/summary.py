@@ -117,7 +117,7 @@ def _retrained(run: RunFiles) -> str:
         return "" if tested else untested
     least = f"{percent(min(known))}{' or more' if len(known) > 1 else ''}"
     way = "of the way from random actions to the policy beside it"
-    return f"Fresh policies on the frozen reward get {least} {way}, on the mean of their seeds."
+    return f"Fresh policies on the frozen reward get {least} {way}, by the interquartile mean of their seeds."
 
 
 def _outside(run: RunFiles) -> str:
