@@ -51,7 +51,8 @@ def _legend(arms: Sequence[Arm], colours: Mapping[int, str], column: float) -> s
 
 def _panel(task: str, arms: Sequence[Arm], colours: Mapping[int, str]) -> str:
     lines = [(arm, _scored(r)) for arm in arms for r in arm.by_task.get(task, ())]
-    steps = [x for arm, line in lines if not _dashed(arm) for x, _ in line]
+    # of logarithms: what was judged before the first step stands at the left edge
+    steps = [max(x, 1.0) for arm, line in lines if not _dashed(arm) for x, _ in line]
     scores = [y for _, line in lines for _, y in line]
     span = (min(steps, default=1.0), max(steps, default=10.0))
     low, high = min(0.0, *scores, 0.0), max(1.05, *scores, 1.05)

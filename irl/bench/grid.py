@@ -172,9 +172,11 @@ def read_grid(path: Path) -> Grid:
     content = files.read_toml(path, "grid")
     if not isinstance(parts := content.get("part"), list):
         raise UserError(f"{path} has no [[part]]; irl/bench/grid.py shows a grid")
+    if "name" in content:
+        raise UserError(f"{path}: a grid is called as its file is; leave name = {content['name']!r:.60} away")
     shared = {key: content.pop(key) for key in INHERITED if key in content}
     content["part"] = [_part({**shared, **part}, f"{path}: part {i + 1}") for i, part in enumerate(parts)]
-    return from_json(Grid, {**_defaults(Grid), "name": path.stem, **content}, str(path))
+    return from_json(Grid, {**_defaults(Grid), **content, "name": path.stem}, str(path))
 
 
 def _part(given: dict[str, Any], where: str) -> dict[str, Any]:

@@ -8,6 +8,8 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Sequence
+from pathlib import Path
 
 PROGRAM = (
     sys.executable,
@@ -15,6 +17,20 @@ PROGRAM = (
     "from irl.bench.leash import follow; follow(); from irl.experiment.cli import main; main()",
 )
 """`irl` on a leash; it is started with a pipe for its standard input."""
+
+# what `python script words` would see, once this file has been read by its path
+_LED = """
+import os, runpy, sys
+runpy.run_path(sys.argv[1])["follow"]()
+sys.argv = sys.argv[2:]
+sys.path[0] = os.path.dirname(sys.argv[0])
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def script(python: Path, path: Path, words: Sequence[str]) -> tuple[str, ...]:
+    """The command of a script on a leash, by a Python that need not have irl."""
+    return (str(python), "-W", "ignore", "-c", _LED, __file__, str(path), *words)
 
 
 def follow() -> None:

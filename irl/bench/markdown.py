@@ -155,10 +155,11 @@ def _commands(name: str, results: Sequence[Result], grid: Grid | None) -> str:
 
 
 def _provenance(results: Sequence[Result]) -> str:
+    stretches = [stretch for result in results for stretch in _stretches(result)]
     commits = _some(
-        (r.get("commit") or "unknown")[:7] + (" and changes" if r.get("dirty") else "") for r in results
+        (s.get("commit") or "unknown")[:7] + (" and changes" if s.get("dirty") else "") for s in stretches
     )
-    machines = _some(f"{r['machine']}, {r['device']}" for r in results if "machine" in r)
+    machines = _some(f"{s['machine']}, {s['device']}" for s in stretches if "machine" in s)
     paced = "" if all("curve_s" in r for r in results) else "; of runs that have no clock, at an even pace"
     return (
         f"Commit {', '.join(commits)}; {'; '.join(machines) or 'machine unknown'}; one thread a run. The "
@@ -167,6 +168,15 @@ def _provenance(results: Sequence[Result]) -> str:
         f"seconds: median over seeds to the first evaluation that is there, `-` where half or more "
         f"never are{paced}."
     )
+
+
+def _stretches(result: Result) -> list[Result]:
+    """The result as its run was begun, and as it was wherever it was gone on with."""
+    found: list[Result] = [result]
+    for resumed in result.get("resumed", ()):
+        made = {f"git_{name}": found[-1].get(name) for name in ("commit", "dirty")} | resumed
+        found.append({**found[-1], **made, "commit": made["git_commit"], "dirty": made["git_dirty"]})
+    return found
 
 
 def _not_shown(

@@ -103,6 +103,8 @@ def _of_run(run: Path) -> dict[str, Any]:
         **{name: made[name] for name in ("machine", "device", "threads")},
         "commit": made["git_commit"],
         "dirty": made["git_dirty"],
+        # another commit or machine, from a step on
+        **({"resumed": made["resumed"]} if "resumed" in made else {}),
     }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from irl.bench import results
 from irl.bench.cells import Cell
-from irl.bench.leash import PROGRAM
+from irl.bench.leash import PROGRAM, script
 from irl.bench.processes import Processes, held
 from irl.core import files
 from irl.core.config import to_json
@@ -132,10 +132,9 @@ def _peer(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]:
     dataset(cell.task, places, processes)
     if not (run / "peer.json").is_file():
         arrays = _arrays(cell, places, run)
-        script = str(places.scripts / cell.script)
         words = (cell.method, cell.task, str(arrays), str(cell.seed), str(cell.steps), str(run))
-        python = str(places.peer_python)
-        _ended(cell, places, processes, (python, "-W", "ignore", script, *words, *cell.settings))
+        path, python = places.scripts / cell.script, places.peer_python
+        _ended(cell, places, processes, script(python, path, (*words, *cell.settings)))
     return results.of_peer(cell, run)
 
 

@@ -71,6 +71,20 @@ class RunFolder:
         with (self.path / "metrics.jsonl").open("a") as file:
             file.write(json.dumps(clean) + "\n")
 
+    def goes_on(self, env_steps: int, made_by: Mapping[str, Any]) -> None:
+        """Add to `environment.json`, as `resumed`, what of it is not as it was before this step."""
+        path = self.path / "environment.json"
+        content = files.read_json(path) if path.is_file() else {}
+        if not isinstance(content, dict) or not isinstance(resumed := content.get("resumed", []), list):
+            raise UserError(f"{path} is not one that a run writes; take it away, and the run goes on")
+        before = dict(content)
+        for earlier in resumed:
+            before |= earlier if isinstance(earlier, dict) else {}
+        # the command is --resume by then, and says nothing of what was asked
+        changed = {k: v for k, v in made_by.items() if k != "command" and before.get(k) != v}
+        if changed:
+            files.write_json(path, {**content, "resumed": [*resumed, {"env_steps": env_steps, **changed}]})
+
     def forget_rounds_after(self, index: int) -> None:
         """Drop the lines of rounds that a resumed run will write again."""
         kept = [json.dumps(row) + "\n" for row in self.metrics() if row["round"] <= index]

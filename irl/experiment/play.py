@@ -21,6 +21,7 @@ from irl.core.errors import UserError
 from irl.core.finite import NotFinite
 from irl.core.memory import peak_memory
 from irl.core.metrics import Row
+from irl.core.provenance import command_line, environment
 from irl.core.records import RunFolder, snapshot_steps
 from irl.core.rng import episode_seeds
 from irl.core.types import Metrics, RewardFn
@@ -139,6 +140,9 @@ class Player:
             self.algorithm.load_state_dict(content["algorithm"])
             self._recent.extend(content["recent"])
             self._wall_s, self._checkpoint_s = content["wall_s"], content["checkpoint_s"]
+            if (done := self.algorithm.learner.env_steps) < self.steps:
+                device = str(self.folder.config.get("device", "cpu"))
+                self.folder.goes_on(done, environment(command_line(), device))
         self.folder.forget_rounds_after(self.algorithm.index)
 
     def _same_settings(self, before: dict[str, Any]) -> None:

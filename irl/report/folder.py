@@ -32,6 +32,8 @@ class RunFiles:
     """retrain.json: this run is a policy trained on the frozen reward of another."""
     reward: Mapping[str, Any] = field(default_factory=dict)
     """spec.json of the last snapshot's reward."""
+    paid: Mapping[str, Any] = field(default_factory=dict)
+    """reward.json: of a retraining, which frozen reward it is paid."""
 
 
 def read_run(run: Path) -> RunFiles:
@@ -56,6 +58,7 @@ def read_run(run: Path) -> RunFiles:
         retrained=_read_object(run / "retrained.json", {}),
         retrain=_read_object(run / "retrain.json", {}),
         reward=_read_object(last / "reward" / "spec.json", {}) if (last := last_snapshot(run)) else {},
+        paid=_read_object(run / "reward.json", {}),
     )
 
 

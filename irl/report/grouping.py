@@ -46,6 +46,8 @@ def settings_of(run: RunFiles) -> dict[str, str]:
     if source := run.config.get("run"):
         # a reward of another method is another thing, one of another seed is not
         kept["reward of"] = re.sub(r"-?s\d+$", "", PurePath(str(source)).name)
+        # g and f of one discriminator are two
+        kept["reward paid"] = run.paid.get("reward_map")
     return dict(_flat(kept, ""))
 
 

@@ -81,9 +81,13 @@ def _commit(environment: Mapping[str, Any]) -> str | None:
     commit = environment.get("git_commit")
     if not commit:
         return None
-    return f"commit {str(commit)[:10]}" + (
-        " with uncommitted changes" if environment.get("git_dirty") else ""
-    )
+    resumed = environment.get("resumed")
+    rows = resumed if isinstance(resumed, list) else []
+    later = [row.get("git_commit") for row in rows if isinstance(row, Mapping)]
+    said = [
+        f"commit {str(commit)[:10]}" + (" with uncommitted changes" if environment.get("git_dirty") else "")
+    ]
+    return ", then ".join([*said, *(str(one)[:10] for one in later if one)])
 
 
 def _device(environment: Mapping[str, Any]) -> str | None:

@@ -43,12 +43,14 @@ class Page:
         )
         tables = "".join(self.table(table, f"{prefix}{panel.anchor}") for table in panel.tables)
         notes = "".join(f'<p class="soft">{escape(note)}</p>' for note in panel.notes)
-        return reading + self._views(panel, prefix) + panel.html + data + tables + notes
+        # a string of a file has no bare quote here, so this is a link of ours
+        own = panel.html.replace('href="#', f'href="#{prefix}')
+        return reading + self._views(panel, prefix) + own + data + tables + notes
 
     def _views(self, panel: Panel, prefix: str) -> str:
         name = f"{prefix}{panel.anchor}"
         shown = [
-            "".join(drawing(figure, f"{name}-{i}-{j}") for j, figure in enumerate(view.figures))
+            "".join(drawing(figure, f"{name}-{i}-{j}") for j, figure in enumerate(view.figures)) + view.html
             for i, view in enumerate(panel.views)
         ]
         if len(shown) < 2:

@@ -27,7 +27,9 @@ class View:
     """One setting of a tab or a slider, and the figures it shows, side by side where there is room."""
 
     label: str
-    figures: tuple[go.Figure, ...]
+    figures: tuple[go.Figure, ...] = ()
+    html: str = ""
+    """Markup of its own, in which every string of a file is escaped already."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Panel:
     tables: tuple[Table, ...] = ()
     notes: tuple[str, ...] = ()
     html: str = ""
-    """Markup of its own, in which every string of a file is escaped already."""
+    """Likewise, below the views; a link in it to another section names the anchor alone."""
     data: dict[str, Any] = field(default_factory=dict)
     """What a script of the section reads, by name."""
     missing: bool = False

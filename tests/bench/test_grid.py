@@ -84,6 +84,7 @@ def test_only_some_cells_bring_the_runs_that_they_need(tmp_path: Path) -> None:
         ("demos = [5, {", "demos = [0, {", "episodes must be at least 1, not 0"),
         ('kind = "retrain"', 'kind = "rerun"', "kind is one of train, retrain, peer, found 'rerun'"),
         ("[[part]]", "[part]", "not readable TOML"),
+        ('title = "small"', 'name = "big"', "called as its file is; leave name = 'big' away"),
         ('variant = "slow"', "", "two cells called|unknown"),
         ("steps = 500", "steps = 500\nshares = [1.5]", "each in 0 to 1"),
         ('"learner.lr" = 1e-3', "seed = 3", "settings has seed, which would contradict .* write seeds ="),

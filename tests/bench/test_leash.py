@@ -6,15 +6,19 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
+import pytest
+
+from irl.bench.leash import script
 from irl.bench.processes import Processes
 
-SLEEPER = "import time; from irl.bench.leash import follow; follow(); print('up', flush=True); time.sleep(60)"
+SLEEPER = "import time; print('up', flush=True); time.sleep(60)"
 MASTER = """
-import sys, threading
+import sys
 from pathlib import Path
 from irl.bench.processes import Processes
-Processes().run([sys.executable, "-c", sys.argv[1]], Path(sys.argv[2]))
+Processes().run(sys.argv[2:], Path(sys.argv[1]))
 """
 
 
@@ -35,9 +39,19 @@ def is_alive(pid: int) -> bool:
     return bool(said.stdout.strip()) and not said.stdout.startswith("Z")
 
 
-def test_a_killed_worker_leaves_nothing_running(tmp_path: Path) -> None:
+def of_irl(folder: Path) -> tuple[str, ...]:
+    return (sys.executable, "-c", f"from irl.bench.leash import follow; follow(); {SLEEPER}")
+
+
+def of_others(folder: Path) -> tuple[str, ...]:
+    (path := folder / "sleeper.py").write_text(SLEEPER)
+    return script(Path(sys.executable), path, ())
+
+
+@pytest.mark.parametrize("words", [of_irl, of_others])
+def test_a_killed_worker_leaves_nothing_running(tmp_path: Path, words: Any) -> None:
     log = tmp_path / "log"
-    master = subprocess.Popen([sys.executable, "-c", MASTER, SLEEPER, str(log)])
+    master = subprocess.Popen([sys.executable, "-c", MASTER, str(log), *words(tmp_path)])
     try:
         assert wait_for(lambda: log.is_file() and log.read_text() == "up\n")
         (child,) = children(master.pid)
@@ -46,6 +60,19 @@ def test_a_killed_worker_leaves_nothing_running(tmp_path: Path) -> None:
         os.kill(master.pid, signal.SIGKILL)
         master.wait()
     assert wait_for(lambda: not is_alive(child), 10.0)
+
+
+def test_a_script_on_a_leash_sees_what_it_would_see_without(tmp_path: Path) -> None:
+    (tmp_path / "statistics.py").write_text("HERE = 1")
+    said = "import sys, statistics; print(__name__, sys.argv, sys.path[0], statistics.HERE)"
+    (path := tmp_path / "a.py").write_text(said)
+    led = script(Path(sys.executable), path, ("x", "--y"))
+    plain = (sys.executable, str(path), "x", "--y")
+    seen = [
+        subprocess.run(words, stdin=subprocess.PIPE, capture_output=True, text=True, check=True).stdout
+        for words in (led, plain)
+    ]
+    assert seen[0] == seen[1] == f"__main__ {[str(path), 'x', '--y']} {tmp_path} 1\n"
 
 
 def test_a_command_has_one_thread_a_log_and_a_status(tmp_path: Path) -> None:

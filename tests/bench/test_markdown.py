@@ -173,3 +173,18 @@ def test_a_folder_without_results_or_with_a_damaged_one_is_refused(tmp_path: Pat
     with pytest.raises(UserError, match="is no result of a cell: it lacks method, task"):
         read_results(tmp_path / "grid")
     assert all_results(tmp_path) == []
+
+
+def test_a_run_that_went_on_elsewhere_names_both_places() -> None:
+    (whole, *rest) = read_results(BENCHMARKS / "results" / "airl")
+    resumed = [{"env_steps": 5, "git_commit": "beef" * 10}, {"env_steps": 9, "machine": "elsewhere"}]
+    said = section("airl", [{**whole, "resumed": resumed}, *rest], None, [])
+    assert ", beefbee" in said
+    assert f"{whole['machine']}, {whole['device']}; elsewhere, {whole['device']}" in said
+
+
+def test_a_curve_may_begin_before_the_first_step() -> None:
+    row = {"method": "dac", "task": "Hopper-v5", "seed": 1, "demos": 5, "demo_rate": 1, "score": 1.0}
+    drawn = curves([{**row, "curve": [[0, 15.5], [1000, 3702.0]]}])
+    (points,) = re.findall(r'<polyline points="([^"]*)"', drawn)
+    assert [float(point.split(",")[0]) for point in points.split()] == [0.0, 264.0]

@@ -51,6 +51,24 @@ def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
         open_run(tmp_path)
 
 
+def test_where_a_run_goes_on_by_other_code_is_written_down(run: RunFolder) -> None:
+    made_by = {"python": "3", "git_commit": "a", "command": "irl train --resume run"}
+    for step, commit in ((10, "a"), (20, "a"), (30, "b"), (40, "a")):
+        run.goes_on(step, {**made_by, "git_commit": commit})
+    path = run.path / "environment.json"
+    assert json.loads(path.read_text()) == {
+        "python": "3",
+        "resumed": [
+            {"env_steps": 10, "git_commit": "a"},
+            {"env_steps": 30, "git_commit": "b"},
+            {"env_steps": 40, "git_commit": "a"},
+        ],
+    }
+    path.write_text('{"resumed": 3}')
+    with pytest.raises(UserError, match=r"environment\.json is not one that a run writes"):
+        run.goes_on(50, made_by)
+
+
 def test_rows_come_back_in_order(run: RunFolder) -> None:
     rows = [{"round": i, "env_steps": 10 * i, "return_mean": i / 3} for i in range(1, 4)]
     for row in rows:

@@ -127,7 +127,12 @@ def test_a_run_that_died_is_resumed_to_the_same_end(
         with pytest.raises(Died):
             train("died", "--watch.checkpoint-every-s", "0")
     assert len(timeless(Path("died"))) == stop_at + 1
+    begun = files.read_json(Path("died/environment.json"))
+    files.write_json(Path("died/environment.json"), {**begun, "git_commit": "of another day"})
     irl("train", "--resume", "died")
+    steps = timeless(straight)[stop_at - 1]["env_steps"]
+    resumed = [{"env_steps": steps, "git_commit": begun["git_commit"]}]
+    assert files.read_json(Path("died/environment.json"))["resumed"] == resumed
     assert timeless(straight) == timeless(Path("died"))
     assert equal(final_weights(straight), final_weights(Path("died")))
 

@@ -1,5 +1,6 @@
 """Runs beside each other: what is averaged as seeds of one method, and what is not."""
 
+from dataclasses import replace
 from typing import Any
 
 from irl.report.folder import RunFiles
@@ -38,6 +39,18 @@ def test_a_retraining_is_not_averaged_with_its_control_nor_with_another_methods(
     said = [*labels([old, new, control, other]).values()]
     assert said[0] == said[1] == "retrain, Hopper-v5, reward of gail-hopper, hand_written not set"
     assert len(set(said)) == 3
+
+
+def test_policies_on_g_and_on_f_are_two_things() -> None:
+    of = {"kind": "retrain", "snapshot": 9, "run": "runs/airl-hopper-s1"}
+    g, again, f = (
+        replace(a_run(n, **of), paid={"reward_map": m}) for n, m in (("a", "g"), ("b", "g"), ("c", "f"))
+    )
+    assert [*labels([g, again, f]).values()] == [
+        "retrain, Hopper-v5, reward paid g",
+        "retrain, Hopper-v5, reward paid g",
+        "retrain, Hopper-v5, reward paid f",
+    ]
 
 
 def test_a_label_says_a_few_settings_and_stays_one_of_its_own() -> None:

@@ -56,6 +56,15 @@ def test_the_command_is_one_to_type(run: Path) -> None:
     assert "<dd>irl train gail --seed 1</dd>" in write_report(run).read_text()
 
 
+def test_a_run_that_went_on_by_other_code_says_so(run: Path) -> None:
+    environment = json.loads((run / "environment.json").read_text())
+    environment["resumed"] = [{"env_steps": 5, "machine": "m"}, {"env_steps": 9, "git_commit": "beef"}]
+    (run / "environment.json").write_text(json.dumps(environment))
+    assert "commit dd1a33c0ff, then beef" in write_report(run).read_text()
+    (run / "environment.json").write_text(json.dumps(environment | {"resumed": 3}))
+    assert "commit dd1a33c0ff" in write_report(run).read_text()
+
+
 def test_a_tree_that_explains_nothing_is_not_shown(run: Path, evaluation: dict[str, Any]) -> None:
     whole.write(run, whole.grow(evaluation, 3))
     assert "a tree ensemble explains 80 % of it" in write_report(run).read_text()

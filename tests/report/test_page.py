@@ -166,7 +166,7 @@ def test_pictures_are_taken_from_the_run_alone(run: Path, evaluation: dict[str, 
     known = whole.grow(evaluation, 4)
     known["episodes"][0]["film"]["file"] = file
     whole.write(run, known)
-    html = viewer(read_run(run)).html
+    html = "".join(view.html for view in viewer(read_run(run)).views)
     assert "No pictures: " in html
     assert "data:image" not in html
 
@@ -186,6 +186,20 @@ def test_several_runs_lie_beside_each_other(everything: Path, tmp_path: Path) ->
     thick = [trace["name"] for trace in overlay if trace["line"]["width"] == 3]
     assert thick == ["gail, Hopper-v5 (2 runs)", "airl, Hopper-v5 (1 run)"]
     assert len({trace["line"]["color"] for trace in overlay}) == 4
+
+
+def test_what_belongs_to_one_of_several_runs_stays_with_it(
+    run: Path, evaluation: dict[str, Any], tmp_path: Path
+) -> None:
+    known = whole.grow(evaluation, 4)
+    known["episodes"] *= 2
+    whole.write(run, known)
+    page = write_reports([run, run], tmp_path / "two.html").read_text()
+    ids = re.findall(r'<[a-z0-9]+ [^>]*?\bid="([^"]*)"', page)
+    assert len(set(ids)) == len(ids)
+    assert {"run0-episodes-tab-1", "run1-episodes-tab-1"} <= set(ids)
+    pointed = re.findall(r'(?:href="#|aria-controls="|aria-labelledby=")([^"]+)"', page)
+    assert {"run1-crossplay", "how"} <= set(pointed) <= set(ids)
 
 
 def test_no_run_is_no_report(tmp_path: Path) -> None:

@@ -12,9 +12,9 @@ import plotly.graph_objects as go
 
 from irl.report.amounts import amount
 from irl.report.folder import RunFiles, finite, lookup
-from irl.report.markup import controlled, drawing, embedded
+from irl.report.markup import drawing, embedded
 from irl.report.palette import ACCENT, AXIS, INK, LAYOUT, OTHERS
-from irl.report.panel import Panel, plain, unmeasured
+from irl.report.panel import Panel, View, plain, unmeasured
 
 MOST_BYTES = 1_000_000
 """Of the pictures of one episode, as they go into the page."""
@@ -35,9 +35,8 @@ def viewer(run: RunFiles, pictures: bool = True) -> Panel:
         "the two part, and at the fall if there is one."
     )
     shown = [_episode(run.path, row, f"{run.name}-{i}", pictures) for i, row in enumerate(whole)]
-    labels = [_label(row) for row in whole]
-    html = controlled("episode", labels, shown, "tabs", "episode") if len(shown) > 1 else shown[0]
-    return Panel(anchor, title, text, "episodes", html=html)
+    views = tuple(View(_label(row), html=html) for row, html in zip(whole, shown, strict=True))
+    return Panel(anchor, title, text, "episodes", views, control_label="episode")
 
 
 def traces(row: Mapping[str, Any]) -> dict[str, list[float | None]]:
