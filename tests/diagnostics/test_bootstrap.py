@@ -36,12 +36,13 @@ def test_every_stratum_keeps_its_size() -> None:
 def test_the_interval_holds_the_truth_about_as_often_as_it_says() -> None:
     # 0.7 by construction, up to the noise in each column
     true, held = 0.7 / np.sqrt((1 + 0.01) * (0.98 + 0.01)), 0
-    for seed in range(30):
+    for seed in range(100):
         sums, layout = data(seed=seed)
         drawn = bootstrap.counts(layout, 200, stream(seed, "draws"))
         low, high = bootstrap.interval(bootstrap.correlations(sums, 0, drawn)[:, 1])
         held += low <= true <= high
-    assert 24 <= held <= 30
+    # of 95 %, from 30 episodes: a few too narrow; an interval of everything would hold it each time
+    assert 85 <= held <= 98
 
 
 def test_steps_of_one_episode_count_as_one() -> None:

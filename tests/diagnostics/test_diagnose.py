@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import kendalltau, pearsonr, spearmanr
 
 from irl.core.errors import UserError
+from irl.core.types import from_episodes
 from irl.diagnostics.diagnose import diagnose
 from irl.diagnostics.references import NAMES
 from irl.rewards.mujoco import HandWritten
@@ -77,6 +79,31 @@ def test_a_named_distance_of_a_reward_to_itself_is_zero_and_to_its_negation_one(
     assert same.value == pytest.approx(0, abs=1e-6)
     assert opposite.value == pytest.approx(1, abs=1e-6)
     assert same.size > 0
+
+
+def test_named_distances_are_what_a_slow_hand_finds() -> None:
+    reward, names = shaped(3.0), ("pearson", "spearman", "kendall", "erc", "starc-val")
+    found = {d.name: d for d in diagnose(reward, true, STRATA, ns=(1,), named=names).references}
+    batches = [from_episodes([episode]) for episodes in STRATA.values() for episode in episodes]
+    a, b = ([np.asarray(f(batch), float) for batch in batches] for f in (reward, true))
+    learned, own = np.concatenate(a), np.concatenate(b)
+
+    def apart(correlation: float) -> float:
+        return float(np.sqrt((1 - correlation) / 2))
+
+    by_hand = {
+        "pearson": apart(pearsonr(learned, own).statistic),
+        "spearman": apart(spearmanr(learned, own).statistic),
+        "kendall": (1 - kendalltau(learned, own).statistic) / 2,
+        "erc": apart(
+            pearsonr(*([sum(0.99**t * r for t, r in enumerate(e)) for e in of] for of in (a, b))).statistic
+        ),
+    }
+    for name, value in by_hand.items():
+        assert found[name].value == pytest.approx(value, abs=1e-3), name
+    assert len({round(value, 2) for value in by_hand.values()}) == len(by_hand)
+    assert found["starc-val"].value < 1e-4
+    assert (found["erc"].size, found["pearson"].size) == (len(batches), len(own))
 
 
 def test_shaping_counts_for_some_and_not_for_others() -> None:

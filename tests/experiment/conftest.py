@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from irl.core.rng import episode_seeds
 from irl.demos.generate import generate
 from irl.experiment.cli import main
 from irl.policies import shelf
@@ -36,7 +37,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with `policies` and `datasets` of the point mass."""
     folder = tmp_path_factory.mktemp("home")
     policy, random = pointmass.expert(), measure_random(TASK)
-    measured = measure(TASK, policy, list(range(20)))
+    measured = measure(TASK, policy, episode_seeds(0, "card", 20))
     card = Card(
         env_id=TASK,
         level="expert",

@@ -41,12 +41,17 @@ def test_an_expert_is_trained_measured_and_shelved(irl: Command, algo: str) -> N
 def test_the_shelf_is_listed_and_measured_again_to_the_same_numbers(
     irl: Command, capsys: pytest.CaptureFixture
 ) -> None:
-    irl("experts", "list")
-    listed = capsys.readouterr().out
-    assert "PointMass-v0" in listed
-    irl("experts", "evaluate", "--env-id", "PointMass-v0")
-    measured = capsys.readouterr().out
-    assert "PointMass-v0" in measured
+    rows = []
+    for words in (("list", "--markdown"), ("evaluate", "--env-id", "PointMass-v0", "--markdown")):
+        irl("experts", *words)
+        printed = capsys.readouterr().out.splitlines()
+        (row,) = [[cell.strip() for cell in line.split("|")] for line in printed if "PointMass-v0" in line]
+        rows.append(row)
+    listed, measured = rows
+    # but for the minutes and the file's size, which are of the machine
+    assert listed[1:5] == measured[1:5] == ["PointMass-v0", "expert", "by hand", "0M"]
+    assert listed[6:10] == measured[6:10]
+    assert "±" in listed[6]
 
 
 def test_all_of_the_shelf_is_measured_into_one_table(irl: Command, capsys: pytest.CaptureFixture) -> None:

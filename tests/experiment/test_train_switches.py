@@ -1,5 +1,6 @@
 """Switches from the command line to a saved reward that is read and judged."""
 
+import re
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
@@ -143,4 +144,11 @@ def test_every_switch_is_in_the_table_with_its_source() -> None:
     table = (Path(__file__).parents[2] / "scripts" / "benchmarks" / "SWITCHES.md").read_text(encoding="utf-8")
     configs = (GAILConfig, DACConfig, AIRLConfig, ReplayedScheduleConfig, InterleavedConfig)
     names = {field.name for config in configs for field in fields(config)} - sizes
-    assert [name for name in sorted(names) if name.replace("_", "-") not in table] == []
+    lines = [line for line in table.split("## What each")[0].splitlines() if line.startswith("|")][2:]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
+    # name, default, methods, source, why the default
+    assert [row[0] for row in rows if len(row) != 5 or not all(row)] == []
+    listed = [
+        word for row in rows for code in re.findall(r"`([^`]*)`", row[0]) for word in re.split(r"[. ]", code)
+    ]
+    assert [name for name in sorted(names) if name.replace("_", "-") not in listed] == []

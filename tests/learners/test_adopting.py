@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from irl.core.types import from_episodes
+from irl.envs.rollouts import rollouts
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig, SACLearner
 from irl.policies.trainable import TrainablePolicy
@@ -35,10 +37,13 @@ def test_it_acts_as_the_policy_and_log_pi_is_the_policys(which: int) -> None:
     learner.adopt(policy := net.export())
     after = learner.policy().weights
     assert all(np.array_equal(after[name], policy.weights[name]) for name in policy.weights)
-    learner.start(lambda batch: batch.obs[:, 0])
-    batch = learner.collect() if which == 0 else None
-    if batch is not None:
-        torch.testing.assert_close(learner.log_pi(batch), net(batch).detach(), atol=1e-4, rtol=1e-4)
+    # the one that acts and is trained, which is not the average that is exported
+    obs = np.random.default_rng(0).normal(size=(5, 2)).astype(np.float32)
+    seen = np.column_stack([obs, np.zeros(5, np.float32)]) if which == 2 else obs
+    acted, _ = learner.model.predict(seen, deterministic=True)
+    np.testing.assert_allclose(acted, [policy(o) for o in obs], atol=1e-5)
+    batch = from_episodes(rollouts(TASK, policy, [3]))
+    torch.testing.assert_close(learner.log_pi(batch), net(batch).detach(), atol=1e-4, rtol=1e-4)
     learner.close()
 
 

@@ -113,6 +113,9 @@ def test_a_cloned_policy_is_taken_in_by_the_actor_and_its_target() -> None:
             p += 0.1
     ours.adopt(cloned := net.export())
     np.testing.assert_array_equal(ours.policy()(np.ones(2)), cloned(np.ones(2)))
+    # the last number says that this is no absorbing state
+    acted, _ = ours.model.predict(np.array([1.0, 1.0, 0.0], np.float32), deterministic=True)
+    np.testing.assert_allclose(acted, cloned(np.ones(2)), atol=1e-5)
     for mine, its in zip(ours.model.actor.parameters(), ours.model.actor_target.parameters(), strict=True):
         assert torch.equal(mine, its)
 
