@@ -90,12 +90,14 @@ def anneal(discriminator: Discriminator, taken: int, steps: int) -> None:
 
 @torch.no_grad()
 def judge(discriminator: Discriminator, expert: Transitions, policy: Transitions) -> Metrics:
-    """How well it tells the demonstrations from these steps of the policy."""
+    """How well it tells the demonstrations, by their weights, from these steps of the policy."""
     of_expert, of_policy = discriminator.logits(expert), discriminator.logits(policy)
+    weight = torch.ones_like(of_expert) if expert.weight is None else expert.weight
+    share = weight.double() / weight.double().sum()
     return {
-        "discriminator/accuracy_expert": float((of_expert > 0).double().mean()),
+        "discriminator/accuracy_expert": float((share * (of_expert > 0)).sum()),
         "discriminator/accuracy_policy": float((of_policy < 0).double().mean()),
-        "discriminator/logit_expert": float(of_expert.mean()),
+        "discriminator/logit_expert": float((share * of_expert).sum()),
         "discriminator/logit_policy": float(of_policy.mean()),
     }
 

@@ -50,6 +50,17 @@ def mixed(batch: Transitions, expert: Transitions, share: float) -> Transitions:
     return concatenate([expert[:rows], batch[rows:]]) if rows else batch
 
 
+def as_weighted(expert: Transitions, rng: torch.Generator) -> Transitions:
+    """As many of these rows, drawn by their weights: for a learner, which reads none.
+
+    Thinned demonstrations keep every step into the absorbing state, at a weight of 1 / rate.
+    """
+    if expert.weight is None:
+        return expert
+    rows = torch.multinomial(expert.weight, len(expert), replacement=True, generator=rng)
+    return expert[rows]
+
+
 class Interleaved:
     """The two players on one memory, and the demonstrations they meet over."""
 
@@ -96,7 +107,9 @@ class Interleaved:
         if learns:
             for name, value in self.discriminator.update(expert, batch).items():
                 self._sums[name] = self._sums.get(name, 0.0) + value
-        return mixed(batch, expert, self.schedule.expert_share)
+        if not self.schedule.expert_share:
+            return batch
+        return mixed(batch, as_weighted(expert, self.rng), self.schedule.expert_share)
 
     def state_dict(self) -> dict[str, Any]:
         """Everything needed to go on, between two rounds."""

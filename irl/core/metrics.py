@@ -54,7 +54,7 @@ DECLARED: dict[str, tuple[str, str]] = {
     "bc/log_pi_held_out": ("the same of demonstrations held out, at the round's end", "nats"),
     "ppo/approx_kl": ("divergence of the old policy from the new one, mean over the last pass", "nats"),
     "ppo/clip_fraction": ("share of probability ratios beyond the clip range", "1"),
-    "ppo/policy_loss": ("minus the clipped surrogate, mean over the last pass", "advantage"),
+    "ppo/policy_loss": ("minus the clipped surrogate, mean over all passes", "advantage"),
     "ppo/value_loss": ("squared error of the value, scaled reward", "1"),
     "ppo/explained_variance": ("share of the return's variance that the value explains", "1"),
     "sac/actor_loss": ("the actor's loss at the round's last update", "scaled return"),

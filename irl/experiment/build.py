@@ -55,7 +55,10 @@ def check_device(device: str) -> None:
         UserError: it is a GPU, and torch sees none.
     """
     if device == "cuda" and not torch.cuda.is_available():
-        raise UserError("--device cuda, but torch sees no GPU here; leave it out to train on the CPU")
+        raise UserError(
+            "--device cuda, but torch sees no GPU here; leave it out to train on the CPU. To repeat a run of "
+            "a GPU on the CPU: irl train --config CONFIG --out FOLDER, with device cpu in CONFIG"
+        )
 
 
 def absorbing_scale(config: FromDemonstrations) -> float:

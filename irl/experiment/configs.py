@@ -27,6 +27,19 @@ class GAILRun(AdversarialRun):
     discriminator: GAILConfig = field(default_factory=GAILConfig)
     schedule: ScheduleConfig = field(default_factory=ScheduleConfig)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_tail(self.learner, self.discriminator.absorbing_scale)
+
+
+def _check_tail(learner: PPOConfig, absorbing_scale: float) -> None:
+    """PPO is paid all that the absorbing state pays with the termination; a bound on it would pay dying."""
+    if learner.reward_clip > 0 and absorbing_scale > 0:
+        raise ValueError(
+            f"--learner.reward-clip {learner.reward_clip} would cut off what the absorbing state pays PPO at "
+            f"a termination; leave it out, or learn off policy, where that state is in the memory"
+        )
+
 
 # On rewards that move, an update with each step; random actions only until there is a batch or four.
 # Quantile critics, a rate that falls to 0 and averaged weights: scripts/benchmarks/RESULTS.md has what each
@@ -114,6 +127,8 @@ class AIRLRun(AdversarialRun):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        of = self.discriminator
+        _check_tail(self.learner, of.absorbing_scale if of.terminal == "absorbing" else 0.0)
         if self.discriminator.reward == "f-log-pi" and self.learner.ent_coef > 0:
             raise ValueError(
                 f"entropy would be paid twice: discriminator.reward is f-log-pi and learner.ent_coef is "

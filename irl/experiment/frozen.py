@@ -10,6 +10,7 @@ from irl.core import files
 from irl.core.differences import without
 from irl.core.errors import UserError
 from irl.core.records import RunFolder, open_run
+from irl.envs.discrete import OneHot
 from irl.envs.make import make
 from irl.envs.names import split_name
 from irl.experiment.build import check_learner
@@ -44,6 +45,11 @@ def frozen(config: RetrainRun, snapshot: Path, part: str | None = None) -> Learn
                 f"belongs to"
             )
         check_learner(config.learner.KIND, env)
+        if config.entropy and isinstance(env.action_space, OneHot):
+            raise UserError(
+                f"--entropy pays the density of real-valued actions, and {config.env_id} has a choice of "
+                f"{needs[1]}; use PPO's own bonus: --ppo.ent-coef {config.entropy}"
+            )
         env.reset(seed=config.seed)
         assert isinstance(box, Box)
         env.step(((box.low + box.high) / 2).astype(box.dtype))

@@ -180,7 +180,8 @@ class Player:
                 if late or asked() or learner.env_steps >= self.steps:
                     self._checkpoint(time.monotonic() - began)
                     saved = time.monotonic()
-                if asked() and learner.env_steps < self.steps:
+                if asked():
+                    # after the last round too: who asked does not want what comes next
                     raise Interrupted
 
     def _between_checkpoints(self) -> float:

@@ -24,6 +24,7 @@ from irl.envs.make import check_module
 from irl.envs.names import split_name
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Imitation, RetrainRun
+from irl.experiment.frozen import RECORD, frozen, recorded
 from irl.experiment.judge import finite
 from irl.experiment.play import MAY_CHANGE
 from irl.experiment.progress import each_episode, progress
@@ -36,6 +37,8 @@ from irl.policies.policy import load_policy
 
 GATHERED, FORMAT, VERSION = "retrained.json", "irl.retrained", 1
 UNCHANGED, HAND_WRITTEN = "as trained", "hand-written"
+PAYS = ("weights_sha256", "average_over", "reward_map")
+"""Which of reward.json say whether two retrainings are on one reward."""
 KEY = ("snapshot", "part", "env_id", "algorithm", "env_steps", "settings")
 """What two retrainings have in common that are seeds of one row."""
 
@@ -55,7 +58,7 @@ def retrain(command: Retrain) -> None:
     one_by_one = [_one_of(command, its, step, seed) for seed in command.seeds]
     # every folder is looked at before anything is trained
     configs = [settled(one, its, step) for one in one_by_one]
-    ahead = [_still_to_do(one, config) for one, config in zip(one_by_one, configs, strict=True)]
+    ahead = [_still_to_do(one, config, snapshot) for one, config in zip(one_by_one, configs, strict=True)]
     before = _rows(source.path / GATHERED)
     for one in ahead:
         if one is not None:
@@ -140,11 +143,11 @@ def _one_of(command: Retrain, its: Any, step: int, seed: int) -> Retrain:
     return replace(alone, out=out if command.out is None else command.out / out.name)
 
 
-def _still_to_do(command: Retrain, config: RetrainRun) -> Retrain | None:
+def _still_to_do(command: Retrain, config: RetrainRun, snapshot: Path) -> Retrain | None:
     """The command that begins or goes on with a seed; None where it is done.
 
     Raises:
-        UserError: its folder holds another retraining.
+        UserError: its folder holds another retraining, or one on another reward.
     """
     folder = RunFolder(config.out)
     if not (folder.path / "config.json").is_file():
@@ -155,6 +158,14 @@ def _still_to_do(command: Retrain, config: RetrainRun) -> Retrain | None:
     if changed:
         raise UserError(
             f"{folder.path} is a run with other settings: {'; '.join(changed):.300}; choose another --out"
+        )
+    reward = frozen(config, snapshot, command.part)
+    now, then = recorded(config, reward, snapshot), files.read_json(folder.path / RECORD)
+    # a run may be renamed, and another have its name: what counts is what pays
+    if not isinstance(then, dict) or any(then.get(name) != now.get(name) for name in PAYS):
+        raise UserError(
+            f"{folder.path} is of another reward than {snapshot / 'reward'}; choose another --out, or take "
+            f"it away"
         )
     if (folder.path / RESULT).is_file():
         return None

@@ -7,6 +7,7 @@ normalised as the reward normalises them, by a copy that does not move. `--hand-
 control: the task's own reward in its place.
 """
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -188,13 +189,18 @@ def settled(command: Retrain, its: Any, step: int) -> RetrainRun:
         env_id=env_id,
         steps=its.steps if command.steps is None else command.steps,
         seed=seed,
-        out=command.out or Path("runs") / f"retrain-{source.name}-{step}{of}-{algo}-s{seed}",
+        out=command.out or Path("runs") / f"retrain-{_called(source)}-{step}{of}-{algo}-s{seed}",
         learner=getattr(command, algo),
         entropy=command.entropy,
         watch=command.watch,
         device=command.device,
         threads=command.threads,
     )
+
+
+def _called(run: Path) -> str:
+    """What a run is called beside others: one of several seeds is s<seed>, as those of other methods are."""
+    return f"{run.parent.name}-{run.name}" if re.fullmatch(r"s\d+", run.name) else run.name
 
 
 def _resumed(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:

@@ -32,6 +32,7 @@ from irl.policies.card import normalised_score
 
 SUMMARY = "seeds.json"
 NOT_EVALUATED = "the run ended without an evaluation: --watch.eval-episodes is 0"
+NOT_FINITE = "a return is not a finite number"
 ONE_SEED = "one seed says nothing of another"
 
 
@@ -97,7 +98,9 @@ def summary(config: FromDemonstrations, runs: Sequence[RunFolder]) -> dict[str, 
     measured = "score" if card is not None else "eval_return_mean"
     values = np.array([np.nan if row[measured] is None else row[measured] for row in rows])
     low, high = iqm_interval(values, stream(0, "seeds"))
-    reason = NOT_EVALUATED if np.isnan(values).any() else ONE_SEED if len(values) < 2 else None
+    reason = ONE_SEED if len(values) < 2 else None
+    if np.isnan(values).any():
+        reason = NOT_FINITE if config.watch.eval_episodes else NOT_EVALUATED
     return {
         "format": "irl.seeds",
         "version": 1,

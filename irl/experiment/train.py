@@ -81,6 +81,7 @@ def go_on(command: Resume) -> None:
                 f"{folder.path} is a run of kind {kind!r}; go on with: {command_of} --resume {folder.path}"
             )
     config = from_json(FromDemonstrations, folder.config, str(folder.path / "config.json"))
+    build.check_device(config.device)
     demos = drawn_again(config, folder)
     torch.set_num_threads(config.threads)
     return play(config, demos, folder)

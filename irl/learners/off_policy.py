@@ -22,7 +22,7 @@ from irl.core.nets import CLIP, NO_CLIP, Normaliser
 from irl.core.rng import torch_stream
 from irl.core.schedule import learning_rate
 from irl.core.types import Metrics, RewardFn, Transitions
-from irl.learners.adopting import adopt
+from irl.learners.adopting import adopt, seeing
 from irl.learners.averaging import WeightAverage
 from irl.learners.features import NormalisedFeatures, Spaces, widened
 from irl.learners.inputs import Inputs
@@ -221,7 +221,8 @@ class OffPolicyLearner(ABC, Generic[C, M, U]):
         """The current policy, exported: a copy that later updates leave alone."""
         weights = {name: weight.numpy().copy() for name, weight in self._average.weights.items()}
         # nobody acts in the absorbing state, so its indicator is 0 for whoever acts
-        weights["layers.0.weight"] = weights["layers.0.weight"][:, : len(self._normaliser.mean)].copy()
+        for name in weights.keys() & seeing(self.config.hidden):
+            weights[name] = weights[name][:, : len(self._normaliser.mean)].copy()
         mean, std = self._normaliser.mean, self._normaliser.std
         weights |= {"obs_mean": mean.cpu().numpy().copy(), "obs_std": std.cpu().numpy().copy()}
         if self._normaliser.clip != CLIP:

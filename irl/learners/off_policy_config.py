@@ -38,7 +38,7 @@ class OffPolicyConfig:
     tau: float = 0.005
     """How far targets follow."""
     n_critics: int = 2
-    """Critics; the lowest counts."""
+    """Critics. The lowest counts; of those with quantiles, the lower part of all of them together."""
     hidden: tuple[int, ...] = (256, 256)
     """Width of each hidden layer of actor and critics, ReLU between."""
     products: Literal["float32", "bfloat16"] = "float32"

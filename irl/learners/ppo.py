@@ -72,7 +72,8 @@ class PPOConfig:
     lr: float = 6e-4
     """Adam step size."""
     lr_schedule: Literal["constant", "linear"] = "linear"
-    """`constant`, or `linear` from `lr` to 0 over the run."""
+    """`constant`, or `linear` from `lr` to 0 over the run: by what remains once a rollout is played, as in
+    SB3, so that the passes over the last one are at 0."""
     gamma: float = 0.99
     """Discount per environment step."""
     gae_lambda: float = 0.97
@@ -111,6 +112,8 @@ class PPOConfig:
         check_at_least(self, 1, "n_envs", "steps_per_round", "batch_size", "n_epochs")
         check_at_least(self, 0, "lr", "clip_range", "vf_coef", "reward_clip")
         check_widths(self, "hidden")
+        if self.normalize_advantage and self.batch_size < 2:
+            raise ValueError("batch_size must be at least 2: one advantage has no deviation to be divided by")
         if self.max_grad_norm <= 0.0:
             # 0 would clip every gradient away
             raise ValueError(f"max_grad_norm must be above 0, not {self.max_grad_norm}")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from irl.algorithms.adversarial import Adversarial, ReplayedScheduleConfig, ScheduleConfig
+from irl.algorithms.adversarial import Adversarial, ReplayedScheduleConfig, ScheduleConfig, judge
 from irl.algorithms.loop import BeforeUpdate
 from irl.core.finite import NotFinite
 from irl.core.nets import fitted_normaliser
@@ -223,3 +223,18 @@ def test_a_discriminator_that_is_not_finite_stops_the_round_before_it_rewards() 
     with pytest.raises(NotFinite, match=r"^discriminator body\.0\.weight \(1 of 2 numbers"):
         next(loop.rounds(30))
     assert "reward" not in told.calls
+
+
+def test_demonstrations_are_judged_by_their_weights() -> None:
+    class First(Told):
+        def logits(self, batch: Transitions) -> torch.Tensor:
+            return batch.obs[:, 0]
+
+    obs = torch.tensor([[1.0, 0.0], [-3.0, 0.0]])
+    expert = from_episodes(pointmass.demonstrations(1))[torch.tensor([0, 1])]
+    expert = replace(expert, obs=obs, weight=torch.tensor([0.75, 0.25]))
+    found = judge(First(), expert, replace(expert, obs=-obs))
+    assert found["discriminator/accuracy_expert"] == 0.75
+    assert found["discriminator/logit_expert"] == 0.0
+    # the policy's are its own steps, each once
+    assert found["discriminator/accuracy_policy"] == 0.5

@@ -3,12 +3,14 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 
-from irl.algorithms.interleaved import Interleaved, InterleavedConfig, mixed
+from irl.algorithms.interleaved import Interleaved, InterleavedConfig, as_weighted, mixed
 from irl.core.rng import torch_stream
 from irl.core.types import Metrics, Transitions, from_episodes
+from irl.envs.absorbing import subsample
 from irl.learners.sac import SACConfig, SACLearner
 from irl.learners.td3 import TD3Config, TD3Learner
 from tests import pointmass
@@ -139,6 +141,27 @@ def test_a_share_of_what_is_learned_from_is_the_experts() -> None:
         # the discriminator learns from the whole drawn batch, the learner from what is left of it
         assert torch.equal(of_reward.obs[4:], of_update.obs[4:])
         assert not torch.equal(of_reward.obs[:4], of_update.obs[:4])
+
+
+def test_the_experts_share_of_thinned_demonstrations_is_as_weighty_as_their_steps() -> None:
+    episodes = [replace(episode, terminated=True) for episode in pointmass.demonstrations(4)]
+    expert = subsample(episodes, 10, np.random.default_rng(0), absorbing=True)
+    assert expert.weight is not None
+    assert expert.absorbing is not None
+    into = expert.absorbing | expert.terminated
+    wanted = float(expert.weight[into].sum() / expert.weight.sum())
+    assert float(into.double().mean()) > 2 * wanted
+
+    def seen(batch: Transitions) -> torch.Tensor:
+        assert batch.absorbing is not None
+        return batch.absorbing
+
+    rng = torch_stream(0, "minibatches")
+    drawn = [as_weighted(expert.sample(200, rng), rng) for _ in range(50)]
+    found = np.mean([float((batch.terminated | seen(batch)).double().mean()) for batch in drawn])
+    assert found == pytest.approx(wanted, rel=0.2)
+    plain = replace(expert, weight=None)
+    assert as_weighted(plain, rng) is plain
 
 
 def test_no_share_is_the_drawn_batch_itself() -> None:

@@ -1,5 +1,6 @@
 """Several seeds of a retraining: each fresh, none done twice, and gathered beside the run."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -86,6 +87,29 @@ def test_another_learner_is_another_row_and_says_so(irl: Command, capsys: pytest
     old, new = rows()
     assert old == kept
     assert new == before
+
+
+@pytest.mark.usefixtures("runs")
+def test_what_another_reward_taught_is_not_taken_for_this_ones(
+    irl: Command, capsys: pytest.CaptureFixture
+) -> None:
+    shutil.copytree("gail", "other/gail")
+    irl("retrain", "gail", "--seeds", "7", "--out", "again", *SHORT)
+    first, *_, last = sorted(Path("other/gail/snapshots").iterdir())
+    shutil.copytree(first / "reward", last / "reward", dirs_exist_ok=True)
+    for _ in ("done", "cut short"):
+        with pytest.raises(SystemExit) as stop:
+            irl("retrain", "other/gail", "--seeds", "7", "--out", "again", *SHORT)
+        assert stop.value.code == 2
+        assert "again/retrain-gail-768-ppo-s7 is of another reward" in capsys.readouterr().err
+        Path("again/retrain-gail-768-ppo-s7/retrain.json").unlink(missing_ok=True)
+    assert not Path("other/gail/retrained.json").exists()
+
+
+def test_retrainings_of_one_of_several_seeds_have_its_methods_name() -> None:
+    its = replace(GAILRun("Hopper-v5", seed=0).resolved(), steps=10)
+    names = [settled(Retrain(Path(of) / "s0"), its, 10).out.name for of in ("dac-hopper", "gail-sac-hopper")]
+    assert names == ["retrain-dac-hopper-s0-10-ppo-s1000", "retrain-gail-sac-hopper-s0-10-ppo-s1000"]
 
 
 def test_the_dynamics_are_part_of_the_tasks_name() -> None:

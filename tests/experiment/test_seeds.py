@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from irl.core import files
-from irl.core.records import open_run
+from irl.core.records import create, open_run
 from irl.experiment.configs import BCRun, GAILRun
+from irl.experiment.seeds import summary
 from irl.policies.policy import load_policy
 from tests.experiment.conftest import QUICK, TASK
 
@@ -53,6 +54,14 @@ def test_one_seed_has_no_interval_and_an_unmeasured_run_no_score(irl: Command) -
     found = files.read_json(Path("one/seeds.json"))
     assert (found["iqm"], found["interval_95"]) == (None, [None, None])
     assert "without an evaluation" in found["interval_95_reason"]
+
+
+def test_a_return_that_is_no_number_is_the_reason(tmp_path: Path) -> None:
+    runs = [create(tmp_path / str(seed), {}, {}) for seed in (0, 1)]
+    for run, value in zip(runs, (1.0, np.nan), strict=True):
+        run.append({"round": 1, "env_steps": 10, "eval_return_mean": value})
+    found = summary(GAILRun("NoReward-v0", seeds="0-1"), runs)
+    assert found["interval_95_reason"] == "a return is not a finite number"
 
 
 @pytest.mark.parametrize("words", ["a", "4-0", "1,1", "0-3,2", "-1", ",", "0-99999"])

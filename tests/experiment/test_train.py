@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from irl.core import files
 from irl.core.records import open_run
@@ -155,6 +156,34 @@ def test_asked_to_stop_it_checkpoints_and_says_how_to_go_on(
     assert "irl train --resume stopped" in capfd.readouterr().err
     irl("train", "--resume", "stopped")
     assert equal(final_weights(straight), final_weights(Path("stopped")))
+
+
+def test_asked_to_stop_in_the_last_round_nothing_else_is_begun(
+    irl: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ask(row: dict, steps_per_s: float) -> str:
+        if row["env_steps"] >= 256:
+            play.signal.raise_signal(play.signal.SIGINT)
+        return ""
+
+    monkeypatch.setattr(play, "training_words", ask)
+    words = ("--env-id", TASK, *QUICK, "--steps=256", "--watch.no-tensorboard", "--watch.progress")
+    with pytest.raises(SystemExit) as stopped:
+        irl("train", "gail", *words, "--seeds=0-1", "--out=many")
+    assert stopped.value.code == 130
+    assert [path.name for path in Path("many").iterdir()] == ["s0"]
+
+
+def test_a_run_of_a_gpu_is_not_gone_on_with_where_there_is_none(
+    train: Train, irl: Command, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    run = train("run")
+    files.write_json(run / "config.json", {**files.read_json(run / "config.json"), "device": "cuda"})
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(SystemExit) as stopped:
+        irl("train", "--resume", run)
+    assert stopped.value.code == 2
+    assert "torch sees no GPU here" in capsys.readouterr().err
 
 
 def test_a_finished_run_resumes_to_itself(train: Train, irl: Command) -> None:

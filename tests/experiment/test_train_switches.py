@@ -22,7 +22,7 @@ from irl.discriminators.gail import GAIL, GAILConfig
 from irl.envs.make import make
 from irl.envs.rollouts import random_act, rollouts
 from irl.experiment import build
-from irl.experiment.configs import GAILRun
+from irl.experiment.configs import OFF_POLICY, AIRLRun, DACRun, GAILRun
 from irl.learners.ppo import PPOConfig
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
@@ -115,6 +115,19 @@ def test_the_scale_and_the_bound_of_rewards_reach_the_learner_and_not_the_saved_
     (newest / "state.safetensors").write_bytes(b"torn")
     irl("train", "--resume", "dac")
     assert (last("dac") / "policy.safetensors").read_bytes() == before
+
+
+def test_a_bound_that_would_pay_dying_is_refused() -> None:
+    clipped = PPOConfig(reward_clip=10.0)
+    for make_run in (
+        lambda: AIRLRun(TASK, learner=clipped),
+        lambda: GAILRun(TASK, learner=clipped, discriminator=GAILConfig(absorbing_scale=10.0)),
+    ):
+        with pytest.raises(ValueError, match="would cut off what the absorbing state pays"):
+            make_run()
+    GAILRun(TASK, learner=clipped)
+    AIRLRun(TASK, learner=clipped, discriminator=AIRLConfig(terminal="mask"))
+    DACRun(TASK, learner=replace(OFF_POLICY, reward_clip=10.0))
 
 
 def test_observations_are_normalised_by_random_actions_too_where_it_is_asked_for(irl: Command) -> None:

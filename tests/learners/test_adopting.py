@@ -47,6 +47,21 @@ def test_it_acts_as_the_policy_and_log_pi_is_the_policys(which: int) -> None:
     learner.close()
 
 
+def test_a_linear_policy_is_exported_and_taken_in_beside_an_absorbing_state() -> None:
+    settings = SACConfig(steps_per_round=8, learning_starts=4, batch_size=4, hidden=())
+    learner = SACLearner(TASK, [0], settings, absorbing_scale=10.0, seed=0, total_steps=100)
+    weights = learner.policy().weights
+    assert weights["layers.0.weight"].shape == weights["log_std.weight"].shape == (2, 2)
+    net = TrainablePolicy(learner.policy(), -2.0)
+    with torch.no_grad():
+        for p in net.parameters():
+            p += 0.1
+    learner.adopt(taken := net.export())
+    batch = from_episodes(rollouts(TASK, taken, [3]))
+    torch.testing.assert_close(learner.log_pi(batch), net(batch).detach(), atol=1e-4, rtol=1e-4)
+    learner.close()
+
+
 def test_it_learns_from_there() -> None:
     learner = learners()[1]
     before = learner.policy()

@@ -204,6 +204,7 @@ def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(tmp_path: Any) 
         ({"gamma": 1.0}, "gamma"),
         ({"n_envs": 3}, "multiple"),
         ({"batch_size": 100}, "multiple"),
+        ({"batch_size": 1}, "batch_size must be at least 2"),
         ({"max_grad_norm": 0.0}, "max_grad_norm must be above 0, not 0.0"),
         ({"gae_lambda": 1.1}, r"gae_lambda must be in \[0, 1\], not 1.1"),
         ({"gae_lambda": -0.1}, r"gae_lambda must be in \[0, 1\], not -0.1"),
