@@ -1,5 +1,6 @@
 """Tables that scripts/benchmarks makes stand in its documents as its committed JSON says."""
 
+import json
 from importlib import import_module
 from pathlib import Path
 
@@ -54,3 +55,18 @@ def test_a_control_is_by_the_same_learner_there() -> None:
     assert not truth.same(walked | {"extra": truth.SHORT}, found)
     for other in others:
         assert truth.circumstances(row) != truth.circumstances(control | other)
+
+
+def test_what_gails_reward_pays_is_what_the_json_has() -> None:
+    def paid(folder: str, policy: str) -> list[int]:
+        files = [BENCHMARKS / "results" / folder / f"gail-halfcheetah-s{seed}.json" for seed in (1, 2, 3)]
+        return [round(json.loads(file.read_text())["paid"][policy]) for file in files]
+
+    def each(values: list[int]) -> str:
+        return " ".join(map(str, values))
+
+    still, expert = ([paid(of, who) for of in ("rewards", "memory")] for who in ("holding still", "expert"))
+    last = f"{each(still[0])}, {min(expert[0])} to {max(expert[0])}"
+    name = "paid for standing still, and for the expert's episode"
+    row = f"| {name} | {last} | {each(still[1])}, {each(expert[1])} |"
+    assert row in lines("FINDINGS.md")

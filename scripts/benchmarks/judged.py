@@ -80,6 +80,8 @@ def judged(run: Path, file: Path) -> dict[str, Any]:
         "cross_play": {name: agrees[-1][name] for name in AGREEMENT},
         "kendall": [of["kendall"]["value"] for of in agrees],
         "policies": len(found["cross_play"]["policies"]),
+        # an episode's return by the last reward, of each
+        "paid": dict(zip(_names(found["cross_play"]), found["cross_play"]["learned"][-1], strict=True)),
         "chosen": found["chosen"].get("compared"),
         "verdicts": {of["name"]: of["fired"] for of in found["verdicts"]},
         "drift": moved
@@ -93,6 +95,10 @@ def judged(run: Path, file: Path) -> dict[str, Any]:
         "trained_by": "irl " + environment["command"].removeprefix("irl ").removeprefix("-c "),
         **{name: environment[name] for name in ("git_commit", "machine", "threads")},
     }
+
+
+def _names(cross_play: dict[str, Any]) -> list[str]:
+    return [policy["name"] for policy in cross_play["policies"]]
 
 
 def row(found: dict[str, Any]) -> str:
