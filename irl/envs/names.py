@@ -15,6 +15,9 @@ from typing import Any
 
 from irl.core.errors import UserError
 
+_PYTHON: dict[str, Any] = {"True": True, "False": False, "None": None}
+"""Python's own words for what JSON has: as text, each would be true where it is asked."""
+
 _HINT = "; expected name=value, the value as JSON or text, or one JSON object, e.g. '{\"x\": 1}'"
 
 
@@ -53,7 +56,7 @@ def _pair(word: str) -> dict[str, Any]:
     try:
         return {name: json.loads(value)}
     except (ValueError, RecursionError):
-        return {name: value}
+        return {name: _PYTHON.get(value, value)}
 
 
 def _object(content: str, what: str) -> dict[str, Any]:

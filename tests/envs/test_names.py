@@ -26,6 +26,13 @@ def test_a_name_is_the_same_however_it_is_written() -> None:
     assert full_name("X-v0", ()) == "X-v0"
 
 
+def test_pythons_own_words_are_no_text() -> None:
+    name = full_name("X-v0", ("no=False", "yes=True", "none=None", "text=Falsehood", 'quoted="False"'))
+    given = {"no": False, "yes": True, "none": None, "text": "Falsehood", "quoted": "False"}
+    assert split_name(name) == ("X-v0", given)
+    assert name == full_name("X-v0", ("no=false", "yes=true", "none=null", "text=Falsehood", 'quoted="False"'))
+
+
 def test_a_variant_is_a_task_of_its_own() -> None:
     variant = full_name("Hopper-v5", ("ctrl_cost_weight=0.5",))
     assert task_of(variant) is task_of("Hopper-v5")
