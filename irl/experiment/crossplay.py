@@ -136,17 +136,27 @@ def _agreement(of: Agreement) -> dict[str, Any]:
 def _second_tasks(env_id: str, root: Path | None) -> tuple[list[tuple[str, ActFn]], list[str]]:
     """Policies that are after something else in the same body, and why there are not more."""
     env = make(env_id)
-    space = env.action_space
+    seen, space = env.observation_space, env.action_space
     env.close()
+    assert isinstance(seen, Box)
     assert isinstance(space, Box)
+    sizes = len(seen.low), len(space.low)
     bare = split_name(env_id)[0]
     cards = [c for c in shelf.cards(root) if c.env_id != env_id and split_name(c.env_id)[0] == bare]
     found: list[tuple[str, ActFn]] = []
+    notes = []
     for card in cards:
-        policy = shelf.find(card.env_id, card.level, root).policy
-        if policy.spec.action_dim == len(space.low):
-            found.append((f"{card.env_id} {card.level}", policy))
-    notes = [] if found else [f"No second task: the shelf has no policy of {bare} with another reward."]
+        policy, name = shelf.find(card.env_id, card.level, root).policy, f"{card.env_id} {card.level}"
+        if (has := (policy.spec.obs_dim, policy.spec.action_dim)) == sizes:
+            found.append((name, policy))
+        else:
+            # a variant may show more of the same body, or less
+            notes.append(
+                f"Left out: {name}, which takes observations of {has[0]} and gives actions of {has[1]}, where "
+                f"the task has {sizes[0]} and {sizes[1]}."
+            )
+    if not found:
+        notes.append(f"No second task: the shelf has no policy of {bare} with another reward.")
     if isinstance(space, OneHot):
         return found, [*notes, f"No policy holds still: actions are a choice of {len(space.low)}."]
     return [*found, (STILL, _still(space))], notes

@@ -16,11 +16,14 @@ from irl.core.types import from_episodes
 from irl.diagnostics.ledger import F, G
 from irl.diagnostics.verdicts import NAMES
 from irl.envs.rollouts import rollouts
+from irl.envs.tasks import task_name
 from irl.experiment import evaluate
 from irl.experiment.cli import main
 from irl.experiment.crossplay import EPISODES, Played, Player, judge_cross_play, play_policies, returns_of
 from irl.experiment.gate import BOUNDS, Gate, broken
 from irl.experiment.trusted import _numbers, _proxy_gold, ledger_of
+from irl.policies import shelf
+from irl.policies.policy import Policy
 from irl.report.folder import lookup
 from irl.rewards.averaged import averaged
 from irl.rewards.learned import LearnedReward, RewardSpec
@@ -28,6 +31,7 @@ from irl.rewards.mujoco import HandWritten
 from irl.rewards.shaped import ShapedNet, ShapedSpec
 from tests import pointmass
 from tests.experiment.conftest import DATASET, LOOK, QUICK, TASK
+from tests.policies.test_shelf import a_card
 
 Command = Callable[..., None]
 
@@ -99,6 +103,26 @@ def test_the_truth_and_its_negation_on_real_policies() -> None:
     assert [row["regret"]["value"] for row in found["agreement"]] == [0.0, 1.0]
     assert found["agreement"][0]["kendall"]["value"] == pytest.approx(1.0)
     assert played.cost["steps"] == 2 * EPISODES * pointmass.STEPS
+
+
+def test_a_policy_that_takes_other_observations_of_the_same_body_is_left_out(tmp_path: Path) -> None:
+    one = pointmass.expert()
+    wide = {"layers.0.weight": np.zeros((2, 3)), "obs_mean": np.zeros(3), "obs_std": np.ones(3)}
+    variants = {"cliff": one, "shown": Policy(replace(one.spec, obs_dim=3), one.weights | wide)}
+    for name, policy in variants.items():
+        other = replace(policy.spec, env_id=f'{TASK}?{{"{name}":1}}')
+        card = replace(a_card(one), env_id=other.env_id)
+        shelf.write(tmp_path / task_name(other.env_id) / "expert", Policy(other, policy.weights), card)
+    base = ProbeSet(TASK, {"expert": tuple(pointmass.demonstrations(1))})
+    played = play_policies(TASK, {0: one}, base, 0, tmp_path)
+    assert [p.name for p in played.players if p.kind == "second-task"] == [
+        f'{TASK}?{{"cliff":1}} expert',
+        "holding still",
+    ]
+    assert played.notes == (
+        f'Left out: {TASK}?{{"shown":1}} expert, which takes observations of 3 and gives actions of 2, where '
+        f"the task has 2 and 2.",
+    )
 
 
 def fallen(gold: list[float], proxy: list[float]) -> tuple[Any, Any]:
