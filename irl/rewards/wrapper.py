@@ -22,7 +22,8 @@ class RewardWrapper(gym.Wrapper):
     """Pays each step by `reward` of that one transition; the environment's own is in `info["own_reward"]`.
 
     It sees what the environment gives: put wrappers that change observations or actions outside it, and
-    give it the observations that the reward was learned on.
+    give it the observations that the reward was learned on. A step after an episode's end is a reset
+    (`gymnasium.wrappers.Autoreset`) and no transition: it pays 0.
 
     Raises:
         ValueError: observations are no flat box, or actions neither that nor a choice.
@@ -33,11 +34,12 @@ class RewardWrapper(gym.Wrapper):
         super().__init__(env)
         self.reward_fn = reward
         self._obs: np.ndarray | None = None
+        self._over = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict]:
         """Start an episode."""
         obs, info = self.env.reset(seed=seed, options=options)
-        self._obs = np.array(obs, dtype=np.float32)
+        self._obs, self._over = np.array(obs, dtype=np.float32), False
         return obs, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict]:
@@ -50,17 +52,20 @@ class RewardWrapper(gym.Wrapper):
         if self._obs is None:
             raise gym.error.ResetNeeded("reset the environment before its first step")
         assert isinstance(self.action_space, Box | Discrete)
-        after = np.array(obs, dtype=np.float32)
+        before, after, resets = self._obs, np.array(obs, dtype=np.float32), self._over
+        self._obs, self._over = after, bool(terminated or truncated)
+        info = {OWN_REWARD: own} | info
+        if resets:
+            return obs, 0.0, terminated, truncated, info
         batch = one_step(
-            self._obs[None],
+            before[None],
             np.asarray(action)[None],
             after[None],
             np.array([terminated]),
             np.array([truncated]),
             self.action_space,
         )
-        self._obs = after
-        return obs, float(pay(self.reward_fn, batch)[0]), terminated, truncated, {OWN_REWARD: own} | info
+        return obs, float(pay(self.reward_fn, batch)[0]), terminated, truncated, info
 
 
 def check_spaces(observation: gym.Space, action: gym.Space) -> None:

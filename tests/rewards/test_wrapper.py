@@ -107,6 +107,22 @@ def test_each_step_goes_from_the_last_observation_to_the_next_also_after_a_reset
             obs = after
 
 
+def test_a_reset_inside_a_step_is_no_transition() -> None:
+    seen = Seen()
+    env = RewardWrapper(gym.wrappers.Autoreset(gym.make("PointMass-v0")), seen)
+    env.reset(seed=0)
+    action, rewards = np.array([1.0, 0.5], np.float32), []
+    for _ in range(pointmass.STEPS + 1):
+        obs, reward, _, truncated, _ = env.step(action)
+        rewards.append(reward)
+    assert not truncated
+    assert rewards == [1.5] * pointmass.STEPS + [0.0]
+    assert len(seen.batches) == pointmass.STEPS
+    # the next episode begins at what the reset gave
+    assert env.step(action)[1] == 1.5
+    np.testing.assert_allclose(seen.batches[-1].obs[0], obs, rtol=1e-6)
+
+
 def test_two_wrappers_pay_the_outer_reward_and_keep_the_environments_own() -> None:
     env = RewardWrapper(
         RewardWrapper(gym.make("PointMass-v0"), Seen()), lambda batch: 7 + 0 * batch.obs[:, 0]
