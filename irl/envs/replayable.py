@@ -10,6 +10,11 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from irl.core.errors import UserError
+
+SAME = 1e-6
+"""Observations may differ by this, by their rounding to float32 among others."""
+
 
 class Replayable(gym.Wrapper):
     """Records what led here since the last reset. Cost: one array copy a step."""
@@ -50,9 +55,36 @@ class Replayable(gym.Wrapper):
             raise RuntimeError("reset the environment before asking for its position")
         return {"generator": self._generator, "seed": self._seed, "actions": list(self._actions)}
 
-    def restore(self, position: dict[str, Any]) -> None:
-        """Bring a fresh environment to where another one was. Cost: the steps of one episode."""
+    def restore(self, position: dict[str, Any]) -> Any:
+        """Bring a fresh environment to where another one was; what is observed there. Cost: one episode's steps.
+
+        Nothing but the environment's `np_random` is brought back: see `check_restored`.
+        """
         self.unwrapped.np_random.bit_generator.state = position["generator"]
-        self.reset(seed=position["seed"])
+        obs, _ = self.reset(seed=position["seed"])
         for action in position["actions"]:
-            self.step(action)
+            obs = self.step(action)[0]
+        return obs
+
+    def check_restored(self, position: dict[str, Any], obs: np.ndarray, expected: np.ndarray) -> None:
+        """Refuse to go on where a replay, which gave `obs`, is by chance elsewhere than the episode was.
+
+        Another processor rounds in its own way, and a body that runs is soon somewhere else by that: it is
+        there again in another replay, which one that follows a generator out of reach is not.
+
+        Raises:
+            UserError: two replays differ, and neither was `expected`.
+        """
+        if _same(obs, expected) or _same(self.restore(position), obs):
+            return
+        spec = self.unwrapped.spec
+        raise UserError(
+            f"{spec.id if spec else type(self.unwrapped).__name__} was replayed to where it was left, and two "
+            f"replays differ: it draws from a generator other than its np_random, so what was begun in it "
+            f"cannot go on; let it draw from self.np_random, which super().reset(seed=seed) seeds, and begin "
+            f"again"
+        )
+
+
+def _same(a: Any, b: Any) -> bool:
+    return bool(np.allclose(np.asarray(a), np.asarray(b), rtol=SAME, atol=SAME))

@@ -261,7 +261,11 @@ class OffPolicyLearner(ABC, Generic[C, M, U]):
         } | self._more()
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go on where another learner of the same settings was; `start` names the reward."""
+        """Go on where another learner of the same settings was; `start` names the reward.
+
+        Raises:
+            UserError: the task draws from a generator of its own, so its place cannot be found again.
+        """
         self.model.policy.load_state_dict(state["policy"])
         self._update.refresh()
         for optimizer, its in zip(self._update.optimizers, state["optimizers"], strict=True):
@@ -272,8 +276,7 @@ class OffPolicyLearner(ABC, Generic[C, M, U]):
         self._average.load_state_dict(state["average"])
         # checkpoints of before there was one have none
         self._scale.load_state_dict(state.get("scale", (0.0, 0.0, 0.0)))
-        self.venv.load_state_dict(state["environments"])
-        self.venv.resume_from(state["last_obs"])
+        self.venv.load_state_dict(state["environments"], state["last_obs"])
         self._rng.set_state(state["rng"])
 
     def close(self) -> None:

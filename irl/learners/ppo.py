@@ -263,7 +263,11 @@ class PPOLearner(Rollouts):
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Go on where another learner of the same settings was."""
+        """Go on where another learner of the same settings was.
+
+        Raises:
+            UserError: the task draws from a generator of its own, so its place cannot be found again.
+        """
         model = self.model
         model.policy.load_state_dict(state["policy"])
         self._update.optimizer.load_state_dict(state["optimizer"])
@@ -271,8 +275,7 @@ class PPOLearner(Rollouts):
         model._last_obs, model._last_episode_starts = state["last_obs"], state["last_starts"]
         self._scale.load_state_dict(state["scale"])
         self._average.load_state_dict(state["average"])
-        self.venv.load_state_dict(state["environments"])
-        self.venv.resume_from(state["last_obs"])
+        self.venv.load_state_dict(state["environments"], state["last_obs"])
         write_global(state["global_random"])
 
     def close(self) -> None:

@@ -178,14 +178,17 @@ class RecordingVecEnv(Recorder):
         positions = [env.position() for env in self._envs()]
         return {"positions": positions, "returns": self._returns.copy(), "lengths": self._lengths.copy()}
 
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Bring the environments there by replaying their last episode so far."""
-        for env, position in zip(self._envs(), state["positions"], strict=True):
-            env.restore(position)
-        self._returns, self._lengths = state["returns"].copy(), state["lengths"].copy()
+    def load_state_dict(self, state: dict[str, Any], obs: Float[np.ndarray, "N O"]) -> None:
+        """Bring the environments there by replaying their last episode so far.
 
-    def resume_from(self, obs: np.ndarray) -> None:
-        """Say what the observations were, after `load_state_dict`: replaying does not return them."""
+        Args:
+            obs: what was observed there.
+        Raises:
+            UserError: a replay does not lead there, because the task draws from a generator of its own.
+        """
+        for env, position, row in zip(self._envs(), state["positions"], obs, strict=True):
+            env.check_restored(position, env.restore(position), row)
+        self._returns, self._lengths = state["returns"].copy(), state["lengths"].copy()
         self._obs = obs
 
     def _envs(self) -> list[Replayable]:

@@ -1,13 +1,38 @@
 """The recording vector of environments, against the same environments stepped by hand."""
 
+from pathlib import Path
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
+import pytest
 import torch
 
+from irl.core import state
+from irl.core.errors import UserError
+from irl.core.log import Logs
+from irl.learners.ppo import PPOConfig, PPOLearner
+from irl.learners.sac import SACConfig, SACLearner
+from irl.learners.td3 import TD3Config, TD3Learner
 from irl.learners.vec import RecordingVecEnv
+from irl.rewards.mujoco import HandWritten
 from tests import pointmass
 
 SEEDS = [3, 5]
+
+
+class OwnDraws(pointmass.PointMass):
+    """Its starts are drawn from a generator of its own, as in much code of before Gymnasium."""
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict]:
+        super().reset(seed=seed)
+        self.rng = np.random.default_rng(seed)
+        self._x = self.rng.uniform(-0.9, 0.9, 2)
+        return self._x.copy(), {}
+
+
+if "OwnDraws-v0" not in gym.registry:
+    gym.register("OwnDraws-v0", OwnDraws, max_episode_steps=pointmass.STEPS, disable_env_checker=True)
 
 
 def _played(env_id: str, n_steps: int) -> tuple[RecordingVecEnv, list]:
@@ -72,11 +97,10 @@ def test_restored_environments_go_on_as_if_nothing_had_happened() -> None:
     venv, _ = _played("Cliff-v0", 25)
     venv.take()
     venv.take_finished()
-    state, obs = venv.state_dict(), venv._obs
+    place, obs = venv.state_dict(), venv.obs
     other = RecordingVecEnv("Cliff-v0", [11, 12])
     other.reset()
-    other.load_state_dict(state)
-    other.resume_from(obs)
+    other.load_state_dict(place, obs)
     rng = np.random.default_rng(1)
     for _ in range(30):
         action = rng.uniform(-1, 1, (2, 2)).astype(np.float32)
@@ -93,8 +117,51 @@ def test_hopper_is_restored_to_the_bit() -> None:
         venv.step(rng.uniform(-1, 1, (1, 3)).astype(np.float32))
     other = RecordingVecEnv("Hopper-v5", [9])
     other.reset()
-    other.load_state_dict(venv.state_dict())
+    other.load_state_dict(venv.state_dict(), venv.obs)
     for _ in range(60):
         action = rng.uniform(-1, 1, (1, 3)).astype(np.float32)
         ours, theirs = venv.step(action), other.step(action)
         np.testing.assert_array_equal(ours[0], theirs[0])
+
+
+def test_a_task_that_draws_from_a_generator_of_its_own_does_not_go_on() -> None:
+    first, _ = _played("OwnDraws-v0", pointmass.STEPS - 1)
+    other = RecordingVecEnv("OwnDraws-v0", [11, 12])
+    other.reset()
+    # the first episode has a seed, and is found again
+    other.load_state_dict(first.state_dict(), first.obs)
+    later, _ = _played("OwnDraws-v0", pointmass.STEPS + 5)
+    with pytest.raises(UserError, match=r"OwnDraws-v0 was replayed.* a generator other than its np_random"):
+        other.load_state_dict(later.state_dict(), later.obs)
+
+
+def test_a_replay_that_another_processor_rounds_goes_on() -> None:
+    venv, _ = _played("Cliff-v0", 25)
+    other = RecordingVecEnv("Cliff-v0", SEEDS)
+    other.reset()
+    other.load_state_dict(venv.state_dict(), elsewhere := venv.obs + 0.1)
+    np.testing.assert_array_equal(other.obs, elsewhere)
+    action = np.zeros((2, 2), np.float32)
+    np.testing.assert_array_equal(other.step(action)[0], venv.step(action)[0])
+
+
+def _learner(kind: str) -> PPOLearner | SACLearner | TD3Learner:
+    shared: dict[str, Any] = {"seed": 0, "total_steps": 600}
+    small: dict[str, Any] = {"steps_per_round": 100, "learning_starts": 150, "batch_size": 16}
+    small |= {"hidden": (8,), "buffer_size": 200}
+    if kind == "ppo":
+        ppo = PPOConfig(n_envs=2, steps_per_round=80, batch_size=40, n_epochs=1, hidden=(8,))
+        return PPOLearner("OwnDraws-v0", SEEDS, ppo, normaliser=None, **shared)
+    if kind == "sac":
+        return SACLearner("OwnDraws-v0", SEEDS[:1], SACConfig(**small), **shared)
+    return TD3Learner("OwnDraws-v0", SEEDS[:1], TD3Config(**small), **shared)
+
+
+@pytest.mark.parametrize("kind", ["ppo", "sac", "td3"])
+def test_no_learner_goes_on_in_such_a_task(kind: str, tmp_path: Path) -> None:
+    learner = _learner(kind)
+    learner.start(HandWritten())
+    learner.collect()
+    state.save(tmp_path, learner.state_dict(), Logs(tmp_path / "logs"))
+    with pytest.raises(UserError, match="np_random"):
+        _learner(kind).load_state_dict(state.load(tmp_path, Logs(tmp_path / "logs")))
