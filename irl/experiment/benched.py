@@ -24,6 +24,7 @@ from irl.bench.worker import Outcome, Places
 from irl.core import files
 from irl.core.config import check_at_least
 from irl.core.errors import UserError
+from irl.envs.make import check_module
 from irl.experiment.configs import FromDemonstrations
 from irl.experiment.play import Interrupted, asked_to_stop
 from irl.experiment.retrain import Retrain
@@ -70,8 +71,9 @@ def bench(command: Bench) -> None:
         SystemExit: 1, a cell failed.
         Interrupted: the user asked to stop; what ran has a checkpoint.
     """
-    cells = only(expand(read_grid(find_grid(command.grid))), command.only)
-    _check(cells)
+    path = find_grid(command.grid)
+    cells = only(expand(read_grid(path)), command.only)
+    _check(cells, path)
     folder = command.results / cells[0].grid
     done = {cell.name for cell in cells if _is_done(cell, folder)}
     ahead = costs([cell for cell in cells if cell.name not in done], measured(all_results(command.results)))
@@ -98,12 +100,14 @@ def bench(command: Bench) -> None:
         raise SystemExit(1)
 
 
-def _check(cells: Sequence[Cell]) -> None:
+def _check(cells: Sequence[Cell], grid: Path) -> None:
     """Refuse settings that a command would, before anything is run.
 
     Raises:
-        UserError: names the cell.
+        UserError: names the cell, or the grid whose task is of a module that nobody typed.
     """
+    for task in {cell.task: None for cell in cells}:
+        check_module(task, str(grid))
     runs = {run.KIND: run for run in get_args(FromDemonstrations)}
     seen = set()
     for cell in cells:

@@ -143,7 +143,7 @@ def generate_demos(command: GenerateDemos) -> None:
 def _generate_all(command: GenerateDemos, play: Play) -> None:
     """A dataset of every card; those that are there stay."""
     root, console = command.policies_root, Console()
-    cards = [card for card in shelf.cards(root) if command.level in (None, card.level)]
+    cards = shelf.to_play(command.level, root)
     if not cards:
         raise UserError("no such policy on the shelf; train one with: irl experts train --env-id Hopper-v5")
     made = []

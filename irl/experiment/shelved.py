@@ -78,9 +78,10 @@ class Row:
 def evaluate(command: EvaluateExpert) -> None:
     """Measure again what the shelf holds and print it."""
     root, level = command.policies_root, command.level or (None if command.all else "expert")
-    named = [(card.env_id, card.level) for card in shelf.cards(root) if level in (None, card.level)]
     if command.env_id:
         named = [(command.env_id, level or "expert")]
+    else:
+        named = [(card.env_id, card.level) for card in shelf.to_play(level, root)]
     rows = []
     with players(command.workers or (cores() if command.all else 1)) as play:
         for env_id, of_level in named or [("Hopper-v5", level or "expert")]:

@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from irl.core import files
 from irl.core.errors import UserError
+from irl.envs.make import check_module
 from irl.envs.tasks import task_name
 from irl.policies.card import Card, read_card, write_card
 from irl.policies.policy import Policy, load_policy, save_policy
@@ -94,6 +95,18 @@ def folders(root: Path | None = None) -> list[tuple[Card, Path]]:
             card = read_card(path)
             found.setdefault((card.env_id, card.level), (card, path.parent))
     return list(found.values())
+
+
+def to_play(level: str | None, root: Path | None = None) -> list[Card]:
+    """The cards of that level, or of every one where it is None, to make the environments that they name.
+
+    Raises:
+        UserError: one names an environment whose module is not to be imported on a file's word.
+    """
+    wanted = [(card, folder) for card, folder in folders(root) if level in (None, card.level)]
+    for card, folder in wanted:
+        check_module(card.env_id, str(folder / CARD))
+    return [card for card, _ in wanted]
 
 
 def write(folder: Path, policy: Policy, card: Card) -> None:

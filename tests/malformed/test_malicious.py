@@ -5,6 +5,7 @@ import io
 import json
 import os
 import pickle
+import shutil
 import struct
 import sys
 from collections.abc import Callable, Iterator
@@ -20,7 +21,7 @@ from minari import MinariDataset
 from irl.core.errors import UserError
 from irl.core.records import open_run
 from irl.report.html import write_report
-from tests.experiment.conftest import DATASET, TASK
+from tests.experiment.conftest import DATASET, LOOK, TASK
 from tests.malformed.conftest import refused
 from tests.malformed.damage import foreign, keyed
 from tests.malformed.table import DATA, SHELVED, SNAPSHOT
@@ -155,7 +156,7 @@ NAMED = {
     "settings, to go on": ("run/config.json", RESUME),
     "settings, to judge": ("run/config.json", EVALUATE),
     "a card": (f"{SHELVED}/card.json", "experts evaluate"),
-    "a card, to judge": (f"{SHELVED}/card.json", EVALUATE),
+    "a card, to demonstrate": (f"{SHELVED}/card.json", "demos generate --all --workers 1"),
     "a reward": (f"{SNAPSHOT}/reward/spec.json", EVALUATE),
 }
 
@@ -167,6 +168,25 @@ def test_a_module_that_a_file_names_is_not_imported(
     place, words = NAMED[name]
     keyed(env_id=evil)(world / place)
     assert "evil" in refused(lambda: irl(*words.split()), capfd)
+    assert not (world / "ran").exists()
+
+
+@pytest.mark.parametrize("words", [" ".join(("evaluate run", *LOOK)), "experts list", f"experts evaluate --env-id {TASK}"])
+def test_a_card_of_a_module_is_in_nobodys_way_and_imports_nothing(
+    words: str, irl: Command, world: Path, evil: str
+) -> None:
+    shutil.copytree(world / SHELVED, other := world / "policies" / "env" / "expert")
+    keyed(env_id=evil)(other / "card.json")
+    irl(*words.split())
+    assert not (world / "ran").exists()
+
+
+def test_a_module_that_a_grid_names_is_not_imported(
+    irl: Command, world: Path, evil: str, capfd: pytest.CaptureFixture
+) -> None:
+    part = '[[part]]\nmethods = ["gail"]\nsteps = 64\n'
+    Path("small.toml").write_text(f'seeds = [1]\ntasks = ["{evil}"]\ndemos = [1]\n{part}')
+    assert "'evil'" in refused(lambda: irl("bench", "small.toml"), capfd)
     assert not (world / "ran").exists()
 
 
