@@ -102,6 +102,10 @@ def _check(model: Any, expert: Transitions, method: str, settings: GAILConfig | 
             f"AIRL's discriminator is f - log pi, and {type(model).__name__}'s policy has one action for a "
             f"state, so no log pi; use a SAC or PPO"
         )
+    if method == "airl" and getattr(model, "use_sde", False):
+        raise ValueError(
+            f"AIRL needs the density of an action: a {type(model).__name__} of Gaussian actions, without use_sde"
+        )
     if isinstance(settings, AIRLConfig) != (method == "airl"):
         raise ValueError(f"{type(settings).__name__} are no settings of {method}")
     observations, actions = model.observation_space.shape, model.action_space.shape

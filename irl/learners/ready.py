@@ -95,9 +95,7 @@ class ReadySAC(_Ready):
         self.model, self._per_round = model, steps_per_round
         self._memory_before = model.replay_buffer
         self._memory = model.replay_buffer = RewardedReplay(model, absorbing)
-        box = model.action_space
-        assert isinstance(box, Box)
-        self._half = torch.as_tensor((box.high - box.low) / 2, device=model.device)
+        _, self._half = _center_and_half(model)
 
     def close(self) -> None:
         """Give the model its environments and its memory back, as they were."""
@@ -172,8 +170,7 @@ class RewardedReplay(ReplayBuffer):
         super().__init__(
             model.buffer_size, model.observation_space, box, device=model.device, n_envs=model.n_envs
         )
-        self._center = torch.as_tensor((box.high + box.low) / 2, device=model.device)
-        self._extent = torch.as_tensor((box.high - box.low) / 2, device=model.device)
+        self._center, self._extent = _center_and_half(model)
 
     def scaled(self, action: Float[Tensor, "B A"]) -> Float[Tensor, "B A"]:
         """Environment units to [-1, 1]."""
@@ -200,6 +197,15 @@ class RewardedReplay(ReplayBuffer):
             reward = self.reward(batch).float()
         check_finite({"reward of a drawn batch": reward})
         return drawn._replace(rewards=reward.unsqueeze(1))
+
+
+def _center_and_half(model: SAC) -> tuple[Float[Tensor, "A"], Float[Tensor, "A"]]:
+    """Of the range of actions, of the networks' own dtype whatever that of the bounds."""
+    box = model.action_space
+    assert isinstance(box, Box)
+    ends = (box.high + box.low) / 2, (box.high - box.low) / 2
+    center, half = (torch.as_tensor(end, dtype=torch.float32, device=model.device) for end in ends)
+    return center, half
 
 
 def ready(model: BaseAlgorithm, steps: int, *, absorbing: bool = False) -> ReadyPPO | ReadySAC:

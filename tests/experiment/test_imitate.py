@@ -7,7 +7,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from gymnasium.spaces import Box
 from stable_baselines3 import PPO, TD3
+from stable_baselines3.common.vec_env import DummyVecEnv
 
 import irl
 from irl.algorithms.adversarial import ScheduleConfig
@@ -40,6 +42,22 @@ def test_the_model_is_trained_in_place_and_the_reward_is_an_artefact(
     steps = from_episodes(demos)
     save_reward(tmp_path, reward.spec, reward.net)
     assert torch.equal(load_reward(tmp_path)(steps), reward(steps))
+
+
+class InDoubles(gym.Wrapper):
+    """Bounds of actions are float64, which `Box` makes of Python's own numbers where it is asked."""
+
+    def __init__(self) -> None:
+        super().__init__(gym.make("PointMass-v0"))
+        self.action_space = Box(-1.0, 1.0, (2,), np.float64)
+
+
+@pytest.mark.parametrize("algorithm", MAKE)
+@pytest.mark.parametrize("method", ["gail", "airl"])
+def test_bounds_of_actions_may_be_doubles(algorithm: str, method: str) -> None:
+    model = MAKE[algorithm](DummyVecEnv([InDoubles]))
+    reward = irl.imitate(model, pointmass.demonstrations(1), method=method, steps=100)
+    assert reward(from_episodes(pointmass.demonstrations(1))).dtype == torch.float32
 
 
 @pytest.mark.parametrize("algorithm", MAKE)
@@ -97,6 +115,8 @@ def test_gail_teaches_a_ready_made_ppo_the_task() -> None:
         ({"method": "bc"}, "unknown method 'bc'; expected 'gail' or 'airl'"),
         ({"method": "airl", "discriminator": GAILConfig()}, "GAILConfig are no settings of airl"),
         ({"model": lambda: TD3("MlpPolicy", envs(n=1)), "method": "airl"}, "TD3's policy has one action for"),
+        ({"model": lambda: a_sac(use_sde=True), "method": "airl"}, "a SAC of Gaussian actions, without use_s"),
+        ({"model": lambda: a_ppo(use_sde=True), "method": "airl"}, "a PPO of Gaussian actions, without use_s"),
         ({"schedule": InterleavedConfig()}, "PPO's schedule is a ScheduleConfig"),
         ({"model": a_sac, "schedule": ScheduleConfig()}, "SAC's schedule is an InterleavedConfig"),
         ({"model": lambda: a_ppo(ent_coef=0.1), "method": "airl"}, "entropy would be paid twice"),
@@ -109,3 +129,4 @@ def test_what_does_not_go_together_is_refused(change: dict[str, Any], message: s
     model = words.pop("model")()
     with pytest.raises(ValueError, match=message):
         irl.imitate(model, pointmass.demonstrations(1), **words)
+    assert model.num_timesteps == 0
