@@ -9,10 +9,14 @@ import numpy as np
 from gymnasium.spaces import Box
 from jaxtyping import Float
 
+from irl.core.errors import UserError
 from irl.core.types import ActFn, Episode
 from irl.envs.discrete import OneHot
 from irl.envs.make import make
 from irl.envs.tasks import task_of, terms_among
+
+MOST = 100_000
+"""Steps of an episode in a task without a time limit, after which it is taken for one that never ends."""
 
 
 def rollout(env: gym.Env, act: ActFn, seed: int) -> Episode:
@@ -23,6 +27,7 @@ def rollout(env: gym.Env, act: ActFn, seed: int) -> Episode:
     and the row's infos recorded, another environment every scalar number that each step's info has.
 
     Raises:
+        UserError: the task has no time limit, and the episode does not end.
         ValueError: actions are no Box (`irl.envs.make.make` makes one of a choice); or one has the wrong
             shape or is not finite.
     """
@@ -33,6 +38,7 @@ def record(env: gym.Env, act: ActFn, seed: int) -> tuple[Episode, dict[str, floa
     """The episode of `rollout`, and the scalar numbers in the info of its reset (e.g. `x_position`).
 
     Raises:
+        UserError: the task has no time limit, and the episode does not end.
         ValueError: actions are no Box; or one has the wrong shape or is not finite.
     """
     space = env.action_space
@@ -41,7 +47,7 @@ def record(env: gym.Env, act: ActFn, seed: int) -> tuple[Episode, dict[str, floa
             f"expected an environment whose actions are a Box, not {space}; irl.envs.make.make(ENV_ID) makes "
             f"one of a choice of actions"
         )
-    low, high, dtype = space.low, space.high, space.dtype
+    most = _most(env)
     start, reset_info = env.reset(seed=seed)
     # copies, here and below: an environment may return the same buffers at every step
     at_reset = {key: float(value) for key, value in reset_info.items() if isinstance(value, Real)}
@@ -49,12 +55,9 @@ def record(env: gym.Env, act: ActFn, seed: int) -> tuple[Episode, dict[str, floa
     actions, rewards, infos = [], [], []
     terminated = truncated = False
     while not (terminated or truncated):
-        wanted = np.asarray(act(obs[-1]), dtype=dtype)
-        if isinstance(space, OneHot):
-            wanted = space.row(wanted)
-        if wanted.shape != low.shape:
-            raise ValueError(f"expected actions of shape {low.shape}, the policy gave {wanted.shape}")
-        action = np.minimum(np.maximum(wanted, low), high)
+        if len(actions) == most:
+            raise _endless(env, most)
+        action = _executed(space, act(obs[-1]))
         after, reward, terminated, truncated, info = env.step(action)
         obs.append(np.array(after, dtype=np.float64))
         actions.append(action)
@@ -86,7 +89,7 @@ def rollouts(
         on_episode: called with each episode as it ends, e.g. to show progress.
 
     Raises:
-        UserError: the environment cannot be made.
+        UserError: the environment cannot be made, or an episode does not end.
         ValueError: an action has the wrong shape or is not finite.
     """
     env = make(env_id)
@@ -117,6 +120,29 @@ def random_act(action_space: gym.Space, rng: np.random.Generator) -> ActFn:
         return rng.uniform(low, high)
 
     return act
+
+
+def _most(env: gym.Env) -> int:
+    limit = env.spec.max_episode_steps if env.spec is not None else None
+    return max(MOST, limit or 0)
+
+
+def _endless(env: gym.Env, steps: int) -> UserError:
+    name = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
+    return UserError(
+        f"{name} has no time limit, and an episode did not end in {steps:,} steps; whole episodes are played, "
+        f"so give it a limit: --env-kwargs max_episode_steps=1000"
+    )
+
+
+def _executed(space: Box, chosen: Any) -> Float[np.ndarray, "A"]:
+    """What the environment is given where a policy chose that."""
+    wanted = np.asarray(chosen, dtype=space.dtype)
+    if isinstance(space, OneHot):
+        wanted = space.row(wanted)
+    if wanted.shape != space.low.shape:
+        raise ValueError(f"expected actions of shape {space.low.shape}, the policy gave {wanted.shape}")
+    return np.minimum(np.maximum(wanted, space.low), space.high)
 
 
 def _finite(actions: Float[np.ndarray, "T A"]) -> Float[np.ndarray, "T A"]:

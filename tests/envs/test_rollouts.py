@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box
 
+from irl.core.errors import UserError
 from irl.core.types import Episode
+from irl.envs import rollouts as rollouts_module
 from irl.envs.make import make
+from irl.envs.names import full_name
 from irl.envs.rollouts import random_act, record, rollout, rollouts
 from tests import pointmass
 
@@ -46,6 +49,18 @@ def test_an_episode_is_what_a_plain_loop_sees():
 def test_a_time_limit_is_recorded_as_one_and_not_as_a_termination():
     (episode,) = pointmass.demonstrations(1)
     assert (len(episode), episode.terminated, episode.truncated) == (pointmass.STEPS, False, True)
+
+
+def test_an_episode_that_never_ends_is_refused_and_one_with_a_limit_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(rollouts_module, "MOST", 50)
+    act = pointmass.expert()
+    with pytest.raises(UserError, match=r"PointMass .*50 steps; .*--env-kwargs max_episode_steps=1000"):
+        rollout(pointmass.PointMass(), act, seed=0)
+    for limit in (20, 80):
+        given = full_name("PointMass-v0", (f"max_episode_steps={limit}",))
+        assert [len(episode) for episode in rollouts(given, act, [0])] == [limit]
 
 
 def test_actions_are_clipped_to_the_bounds():
