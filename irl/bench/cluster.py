@@ -12,6 +12,7 @@ from irl.bench.cells import Cell
 from irl.bench.processes import ONE_THREAD, Processes
 from irl.bench.worker import Outcome, Places, carry_out
 from irl.core.errors import UserError
+from irl.envs.inherited import VARIABLE, inherited
 
 LOCAL = "local"
 
@@ -29,8 +30,10 @@ class Cluster:
         given: dict[str, Any] = (
             {"num_cpus": workers, "include_dashboard": False} if address == LOCAL else {"address": address}
         )
+        # the workers' own environment is that of their node
+        env = ONE_THREAD | {VARIABLE: ",".join(inherited())}
         try:
-            self._ray.init(**given, runtime_env={"env_vars": ONE_THREAD}, log_to_driver=False)
+            self._ray.init(**given, runtime_env={"env_vars": env}, log_to_driver=False)
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise UserError(f"--ray {address}: no cluster there ({error:.200})") from error
         self.workers = workers or max(int(self._ray.cluster_resources().get("CPU", 1)), 1)

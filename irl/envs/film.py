@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 from PIL import Image
 
 from irl.core.types import Episode
+from irl.envs.inherited import inherited
 from irl.envs.make import make
 
 WIDTH, HEIGHT = 240, 180
@@ -93,6 +95,9 @@ def _run(library: str, words: Sequence[str]) -> tuple[dict[str, Any] | None, str
 
 def main(steps: Path, sheet: Path) -> None:
     """Play, draw, write; what was written is said as JSON."""
+    for module in inherited():
+        # which registers the task
+        import_module(module)
     with np.load(steps, allow_pickle=False) as file:
         given = {name: file[name] for name in file.files}
     env = _drawing(str(given["env_id"]))

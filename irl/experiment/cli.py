@@ -35,7 +35,7 @@ from irl.experiment.configs import (
     GAILSACRun,
     GAILTD3Run,
 )
-from irl.experiment.modules import import_named
+from irl.experiment.modules import imported
 from irl.experiment.play import Interrupted
 from irl.experiment.typed import parsed
 
@@ -93,7 +93,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     debug = "--debug" in words
     words = [word for word in words if word != "--debug"]
     try:
-        _dispatch(import_named(words))
+        with imported(words) as rest:
+            _dispatch(rest)
     except (UserError, OSError) as error:
         if debug:
             raise

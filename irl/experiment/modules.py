@@ -1,37 +1,53 @@
 """`--import MODULE` in any command: code that the user names, so that a task of their own is registered.
 
 Only what is typed is imported. A run's files name no module, so it is typed again with `irl evaluate` and the
-others; what a file may name is in `irl.envs.make.check_module`.
+others; what a file may name is in `irl.envs.make.check_module`. Processes that a command starts import them too.
 """
 
 import importlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
 from irl.core.errors import UserError
+from irl.envs.inherited import handed_down, inherited
 
 FLAG = "--import"
 
 
-def import_named(words: list[str]) -> list[str]:
+@contextmanager
+def imported(words: list[str]) -> Iterator[list[str]]:
     """The words without `--import MODULE` or `--import=MODULE`, those modules imported.
+
+    Those that were typed for the process that started this one are imported too, and while this lasts, a
+    process that is started inherits all of them.
 
     Raises:
         UserError: no module is named, or it cannot be imported.
     """
-    rest, left = [], iter(words)
+    rest, typed = _typed(words)
+    modules = list(dict.fromkeys([*inherited(), *typed]))
+    for module in modules:
+        import_module(module, FLAG)
+    with handed_down(modules):
+        yield rest
+
+
+def _typed(words: list[str]) -> tuple[list[str], list[str]]:
+    """The other words, and the modules."""
+    rest, modules, left = [], [], iter(words)
     for word in left:
         name, sign, value = word.partition("=")
         if name != FLAG:
             rest.append(word)
         elif module := value if sign else next(left, ""):
-            import_module(module, FLAG)
+            modules.append(module)
         else:
             raise UserError(f"{FLAG} names no module; expected one, e.g. {FLAG} my_tasks")
-    return rest
+    return rest, modules
 
 
 def import_module(name: str, flag: str) -> ModuleType:

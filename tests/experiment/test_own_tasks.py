@@ -1,6 +1,7 @@
 """Tasks that are not MuJoCo's: with a choice of actions, in a module of the user's, with arguments."""
 
 import json
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,10 +14,14 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Dict, Discrete
 from stable_baselines3 import PPO
 
+from irl.bench.leash import PROGRAM
+from irl.bench.processes import Processes
 from irl.core.records import open_run
 from irl.core.types import Episode, from_episodes
 from irl.demos.load import load_demos
+from irl.envs.inherited import VARIABLE
 from irl.envs.rollouts import rollouts
+from irl.experiment.cli import COMMANDS
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
 from irl.rewards.wrapper import RewardWrapper
@@ -163,6 +168,27 @@ def test_a_task_of_a_module_with_arguments(
         irl("evaluate", "run", *LOOK)
     assert "--import MODULE" in capfd.readouterr().err
     irl("evaluate", "run", *LOOK, f"--import={theirs}")
+
+
+def test_a_process_that_a_command_starts_knows_the_task(
+    irl: Command, theirs: str, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
+    policy = home / "policies" / "pointmass" / "expert" / "policy.safetensors"
+    child = (*PROGRAM, "demos", "generate", "--env-id", "Theirs-v0", "--policy", str(policy))
+    child += ("--episodes", "1", "--dataset-id", "irl/t-v0", "--datasets-root", "ds")
+    ended: list[int] = []
+
+    def start(command: object) -> None:
+        ended.append(Processes().run(child, Path("log")))
+
+    monkeypatch.setitem(COMMANDS, ("metrics",), (COMMANDS["metrics",][0], start))
+    irl("metrics")
+    assert "--import MODULE" in Path("log").read_text()
+    irl("metrics", "--import", theirs)
+    assert ended == [2, 0], Path("log").read_text()
+    # what comes after in this process has not typed it
+    assert VARIABLE not in os.environ
 
 
 def test_arguments_change_the_task_that_is_trained_in(irl: Command) -> None:
