@@ -96,6 +96,8 @@ class GenerateDemos:
             raise ValueError("--all takes the shelf as it is: no --policy, --dataset-id or --env-kwargs")
         if self.vec_normalize is not None and not self.policy:
             raise ValueError("vec_normalize belongs to a policy; name its zip with --policy")
+        if self.policy and self.level is not None:
+            raise ValueError("--level chooses a policy of the shelf; leave it or --policy away")
         if self.policy and (self.workers or 1) > 1:
             raise ValueError("--workers is for policies of the shelf; one named with --policy plays here")
 

@@ -1,5 +1,6 @@
 """`irl probe`: the steps that rewards of a task are judged on, in a file."""
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from irl.core.config import check_at_least, from_json
 from irl.core.errors import UserError
 from irl.core.types import Episode
 from irl.envs.make import check_module, make
-from irl.envs.names import full_name
+from irl.envs.names import full_name, split_name
 from irl.envs.tasks import task_name
 from irl.experiment.configs import FromDemonstrations
 from irl.experiment.imitation_run import Words
@@ -131,6 +132,12 @@ def _task(command: Probe, folder: records.RunFolder | None) -> str:
     where = str(folder.path / "config.json")
     env_id = from_json(FromDemonstrations, folder.config, where).env_id
     check_module(env_id, where)
+    if command.env_id is None and command.env_kwargs:
+        raise UserError(
+            f"{folder.path} is a run of {env_id}; leave --env-kwargs out, or make a probe of another task "
+            f"without a run: irl probe --env-id {split_name(env_id)[0]} --env-kwargs "
+            f"{shlex.join(command.env_kwargs)}"
+        )
     if command.env_id is not None and full_name(command.env_id, command.env_kwargs) != env_id:
         raise UserError(f"{folder.path} is a run of {env_id}; leave --env-id out")
     return env_id

@@ -94,6 +94,18 @@ def test_a_probe_of_another_task_is_one_line(train: Callable[..., Path], irl: Co
     assert "is a probe of Other-v0" in capsys.readouterr().err
 
 
+def test_arguments_beside_a_run_are_refused(irl: Command, train: Callable[..., Path], capsys) -> None:
+    run = train("run")
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as stop:
+        irl("probe", run, "--steps=60", "--env-kwargs", "cliff=1", "--out=p.npz")
+    assert stop.value.code == 2
+    said = capsys.readouterr().err
+    assert f"is a run of {TASK}; leave --env-kwargs out" in said
+    assert f"irl probe --env-id {TASK} --env-kwargs cliff=1" in said
+    assert not Path("p.npz").exists()
+
+
 @pytest.mark.parametrize("words", [("probe",), ("probe", "--env-id=Pendulum-v1"), ("probe", "nowhere")])
 def test_what_is_missing_for_a_probe_is_one_line(words, irl: Command, capsys) -> None:
     with pytest.raises(SystemExit) as stop:
