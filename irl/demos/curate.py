@@ -15,6 +15,7 @@ from irl.demos.recording import together
 from irl.demos.storage import open_dataset, read_episodes
 from irl.demos.write import Labels, Origin, check_target, write
 from irl.envs.discrete import OneHot
+from irl.envs.flatten import part_names
 
 
 def merge(
@@ -38,7 +39,7 @@ def merge(
     if len(set(dataset_ids)) < max(len(dataset_ids), 2):
         raise UserError(f"{len(dataset_ids)} datasets to merge; expected two or more, each once")
     target = check_target(into, root, overwrite)
-    datasets = [open_dataset(name, root, tuple(obs_keys)) for name in dataset_ids]
+    datasets = [open_dataset(name, root, part_names(obs_keys)) for name in dataset_ids]
     first = datasets[0]
     for other in datasets[1:]:
         # another reward or other dynamics are arguments of the same id
@@ -89,7 +90,7 @@ def split(
     if into[0] == into[1]:
         raise UserError(f"both parts would be called {into[0]!r}; choose two names")
     targets = [check_target(name, root, overwrite) for name in into]
-    dataset = open_dataset(dataset_id, root, tuple(obs_keys))
+    dataset = open_dataset(dataset_id, root, part_names(obs_keys))
     if (n := dataset.episodes) < 2:
         raise UserError(f"{dataset_id} has {n} episodes; expected at least 2 to split")
     episodes = read_episodes(dataset, root)

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from irl.demos.recording import Recorded
 from irl.demos.storage import open_dataset, read_episodes
+from irl.envs.flatten import part_names
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def show(dataset_id: str, root: Path | str | None = None, obs_keys: Sequence[str
     Raises:
         UserError: not a dataset id, not there, empty or not readable.
     """
-    dataset = open_dataset(dataset_id, root, tuple(obs_keys))
+    dataset = open_dataset(dataset_id, root, part_names(obs_keys))
     episodes = read_episodes(dataset, root)
     returns, lengths = [e.return_ for e in episodes], [len(e) for e in episodes]
     return DemosInfo(

@@ -15,6 +15,7 @@ from irl.demos.bounds import first_outside
 from irl.demos.metadata import env_name
 from irl.demos.storage import open_dataset, read_episodes
 from irl.demos.write import origin_of
+from irl.envs.flatten import part_names
 from irl.envs.tasks import task_of
 
 
@@ -76,7 +77,7 @@ def load_demos(
     Raises:
         UserError: the dataset is not there or cannot be read, or has fewer episodes.
     """
-    dataset = open_dataset(dataset_id, root, tuple(obs_keys))
+    dataset = open_dataset(dataset_id, root, part_names(obs_keys))
     n = dataset.episodes if episodes is None else episodes
     if n < 1 or n > dataset.episodes:
         raise UserError(

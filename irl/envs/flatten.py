@@ -15,12 +15,34 @@ OBS_KEYS = "obs_keys"
 """Argument of a task's full name (`irl.envs.names`) that names the parts."""
 
 
+def part_names(given: object) -> tuple[str, ...]:
+    """The names that `obs_keys` gives: a list of them, or one.
+
+    Raises:
+        UserError: it is neither.
+    """
+    names = (given,) if isinstance(given, str) else given
+    if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
+        raise UserError(_no_names(given))
+    return tuple(names)
+
+
+def _no_names(given: object) -> str:
+    return (
+        f"obs_keys is {given!r:.60}; expected names of the parts, e.g. --env-kwargs "
+        f"'{{\"{OBS_KEYS}\": [\"observation\"]}}'"
+    )
+
+
 def flat_space(owner: str, space: gym.Space, keys: Sequence[str]) -> Box:
     """The space of the rows.
 
     Raises:
-        UserError: `space` is no Dict, has no such part, or a part is no Box of real numbers.
+        UserError: `space` is no Dict, no part is named, there is none of a name, or one is no Box of real
+            numbers.
     """
+    if not keys:
+        raise UserError(_no_names(list(keys)))
     if not isinstance(space, Dict):
         shown = " ".join(str(space).split())
         raise UserError(f"{owner} has the observations {shown:.120}; obs_keys is for those in a Dict")

@@ -19,7 +19,7 @@ from gymnasium.spaces import Box, Dict, Discrete
 from irl.core.errors import UserError
 from irl.envs.discrete import OneHotActions
 from irl.envs.dynamics import DYNAMICS, MODEL, changed_model
-from irl.envs.flatten import OBS_KEYS, FlatKeys
+from irl.envs.flatten import OBS_KEYS, FlatKeys, part_names
 from irl.envs.guard import Guarded
 from irl.envs.names import split_name
 
@@ -57,7 +57,7 @@ def make(env_id: str, **kwargs: Any) -> gym.Env:
     env = _made(env_id, kwargs) if changes is None else _under(changes, env_id, kwargs)
     try:
         if keys is not None:
-            env = FlatKeys(env, env_id, [keys] if isinstance(keys, str) else keys)
+            env = FlatKeys(env, env_id, part_names(keys))
         if isinstance(env.action_space, Discrete):
             env = OneHotActions(env)
         _check_spaces(env_id, env)

@@ -115,6 +115,7 @@ def _dispatch(words: list[str]) -> None:
 
 
 def _overview(words: list[str]) -> None:
+    words = [word for word in words if word not in ("-h", "--help")]
     near = [name for name in COMMANDS if name[: len(words)] == tuple(words)]
     asked = [word for word in words if not word.startswith("-")]
     if asked and not near:

@@ -11,7 +11,7 @@ from irl.core.errors import UserError
 from irl.core.records import RunFolder
 from irl.demos.load import Demos, check_task, load_demos, other_variant
 from irl.discriminators.airl import AIRLConfig
-from irl.envs.flatten import OBS_KEYS
+from irl.envs.flatten import OBS_KEYS, part_names
 from irl.envs.make import check_module, make
 from irl.envs.names import split_name
 from irl.experiment.build import check_discriminator, check_learner
@@ -71,7 +71,7 @@ def _loaded(config: FromDemonstrations, root: Path | None) -> Demos:
         if not keys:
             raise
         # observations in a dictionary, of which the task's name says the parts
-        return load_demos(config.demos, obs_keys=keys, **given)
+        return load_demos(config.demos, obs_keys=part_names(keys), **given)
 
 
 def drawn(demos: Demos) -> dict[str, Any]:

@@ -91,6 +91,8 @@ def test_parts_of_a_dictionary(form, tmp_path) -> None:
     np.testing.assert_array_equal(demos[0].obs, expected)
     with pytest.raises(UserError, match=r"name the parts .*obs_keys="):
         load_demos("a-v0", root=tmp_path)
+    # one name may stand alone, as in a task's name
+    assert load_demos("a-v0", root=tmp_path, obs_keys="goal")[0].obs.shape == (3, 2)
     for wrong in ("step", "speed"):
         with pytest.raises(UserError, match=f"no real numbers '{wrong}'"):
             load_demos("a-v0", root=tmp_path, obs_keys=(wrong,))

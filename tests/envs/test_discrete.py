@@ -80,5 +80,9 @@ def test_a_dictionary_is_flattened_where_its_parts_are_named(monkeypatch) -> Non
         make("Parts-v0")
     env = make('Parts-v0?{"obs_keys": ["goal"]}')
     assert env.observation_space.shape == (2,)
+    assert make('Parts-v0?{"obs_keys": "goal"}').observation_space == env.observation_space
+    for wrong in ("3", "true", "[]", '[["goal"]]', "{}", "[1]"):
+        with pytest.raises(UserError, match=r'obs_keys is .*; expected names of the parts.*"obs_keys"'):
+            make(f'Parts-v0?{{"obs_keys": {wrong}}}')
     with pytest.raises(UserError, match="obs_keys is for those in a Dict"):
         make('Pendulum-v1?{"obs_keys": ["goal"]}')

@@ -89,6 +89,10 @@ MISTAKES = {
         f"demos generate --env-id {TASK} --policy a:b --workers 2",
         ["--workers", "--policy"],
     ),
+    "a level of the shelf beside another policy": (
+        f"demos generate --env-id {TASK} --policy a:b --level medium",
+        ["--level", "--policy"],
+    ),
     "one expert and all": (f"experts evaluate --env-id {TASK} --all", ["--all", "--env-id"]),
     "a dataset that is there already": (f"demos generate --env-id {TASK}", ["overwrite"]),
 }
@@ -137,6 +141,14 @@ def test_without_words_every_command_is_listed(capsys: pytest.CaptureFixture) ->
     main([])
     listed = capsys.readouterr().out
     assert all(f"irl {' '.join(name)}" in listed for name in COMMANDS)
+
+
+@pytest.mark.parametrize("words", [("demos", "--help"), ("experts", "-h"), ("demos",), ("--help",)])
+def test_words_that_begin_commands_list_those(words: tuple[str, ...], capsys: pytest.CaptureFixture) -> None:
+    main(words)
+    listed = capsys.readouterr().out
+    begun = tuple(word for word in words if not word.startswith("-"))
+    assert all((f"irl {' '.join(name)} " in listed) == (name[: len(begun)] == begun) for name in COMMANDS)
 
 
 def test_the_program_as_installed_exits_with_2_and_one_line(tmp_path: Path) -> None:

@@ -259,8 +259,9 @@ INTO_RUN = ("--datasets-root", "ds", "--demo-episodes=2", "--out", "run", *QUICK
 
 
 @pytest.mark.usefixtures("parts")
-def test_parts_of_observations_in_a_dictionary_are_learned_from(irl: Command) -> None:
-    task = ("--env-id", "InParts-v0", "--env-kwargs", '{"obs_keys": ["place"]}')
+@pytest.mark.parametrize("keys", ['{"obs_keys": ["place"]}', "obs_keys=place"])
+def test_parts_of_observations_in_a_dictionary_are_learned_from(keys: str, irl: Command) -> None:
+    task = ("--env-id", "InParts-v0", "--env-kwargs", keys)
     irl("train", "gail", *task, "--demos", "parts-v0", *INTO_RUN)
     irl("evaluate", "run", *LOOK)
     assert load_reward(Path("run")).spec.net.obs_dim == 2
