@@ -30,7 +30,7 @@ def part_names(given: object) -> tuple[str, ...]:
 def _no_names(given: object) -> str:
     return (
         f"obs_keys is {given!r:.60}; expected names of the parts, e.g. --env-kwargs "
-        f"'{{\"{OBS_KEYS}\": [\"observation\"]}}'"
+        f'\'{{"{OBS_KEYS}": ["observation"]}}\''
     )
 
 

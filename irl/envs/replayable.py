@@ -56,7 +56,7 @@ class Replayable(gym.Wrapper):
         return {"generator": self._generator, "seed": self._seed, "actions": list(self._actions)}
 
     def restore(self, position: dict[str, Any]) -> Any:
-        """Bring a fresh environment to where another one was; what is observed there. Cost: one episode's steps.
+        """Bring a fresh environment to where another one was; what is observed there. Cost: its steps.
 
         Nothing but the environment's `np_random` is brought back: see `check_restored`.
         """
@@ -79,9 +79,9 @@ class Replayable(gym.Wrapper):
             return
         spec = self.unwrapped.spec
         raise UserError(
-            f"{spec.id if spec else type(self.unwrapped).__name__} was replayed to where it was left, and two "
-            f"replays differ: it draws from a generator other than its np_random, so what was begun in it "
-            f"cannot go on; let it draw from self.np_random, which super().reset(seed=seed) seeds, and begin "
+            f"{spec.id if spec else type(self.unwrapped).__name__} was replayed to where it was left, and "
+            f"two replays differ: it draws from a generator other than its np_random, so what was begun in "
+            f"it cannot go on; let it draw from self.np_random, which super().reset(seed=seed) seeds, and begin "
             f"again"
         )
 

@@ -130,8 +130,8 @@ def _most(env: gym.Env) -> int:
 def _endless(env: gym.Env, steps: int) -> UserError:
     name = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
     return UserError(
-        f"{name} has no time limit, and an episode did not end in {steps:,} steps; whole episodes are played, "
-        f"so give it a limit: --env-kwargs max_episode_steps=1000"
+        f"{name} has no time limit, and an episode did not end in {steps:,} steps; whole episodes are "
+        f"played, so give it a limit: --env-kwargs max_episode_steps=1000"
     )
 
 

@@ -152,8 +152,8 @@ def _second_tasks(env_id: str, root: Path | None) -> tuple[list[tuple[str, ActFn
         else:
             # a variant may show more of the same body, or less
             notes.append(
-                f"Left out: {name}, which takes observations of {has[0]} and gives actions of {has[1]}, where "
-                f"the task has {sizes[0]} and {sizes[1]}."
+                f"Left out: {name}, which takes observations of {has[0]} and gives actions of {has[1]}, "
+                f"where the task has {sizes[0]} and {sizes[1]}."
             )
     if not found:
         notes.append(f"No second task: the shelf has no policy of {bare} with another reward.")

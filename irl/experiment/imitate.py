@@ -104,7 +104,8 @@ def _check(model: Any, expert: Transitions, method: str, settings: GAILConfig | 
         )
     if method == "airl" and getattr(model, "use_sde", False):
         raise ValueError(
-            f"AIRL needs the density of an action: a {type(model).__name__} of Gaussian actions, without use_sde"
+            f"AIRL needs the density of an action: a {type(model).__name__} of Gaussian actions, "
+            f"without use_sde"
         )
     if isinstance(settings, AIRLConfig) != (method == "airl"):
         raise ValueError(f"{type(settings).__name__} are no settings of {method}")

@@ -1,7 +1,8 @@
 """`--import MODULE` in any command: code that the user names, so that a task of their own is registered.
 
 Only what is typed is imported. A run's files name no module, so it is typed again with `irl evaluate` and the
-others; what a file may name is in `irl.envs.make.check_module`. Processes that a command starts import them too.
+others; what a file may name is in `irl.envs.make.check_module`. Processes that a command starts import
+them too.
 """
 
 import importlib

@@ -41,7 +41,7 @@ def test_a_task_of_a_module_that_was_typed_is_drawn(tmp_path: Path, monkeypatch:
     (tmp_path / "drawn_task_module.py").write_text(DRAWN)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
-    spec = EnvSpec("Drawn-v0", Drawn, max_episode_steps=30, disable_env_checker=True)
+    spec = EnvSpec("Drawn-v0", lambda **_: Drawn(), max_episode_steps=30, disable_env_checker=True)
     monkeypatch.setitem(gym.registry, "Drawn-v0", spec)
     (episode,) = rollouts("Drawn-v0", lambda obs: np.ones(2), [4])
     with pytest.raises(RuntimeError, match="there is no environment 'Drawn-v0'"):

@@ -30,7 +30,9 @@ def test_pythons_own_words_are_no_text() -> None:
     name = full_name("X-v0", ("no=False", "yes=True", "none=None", "text=Falsehood", 'quoted="False"'))
     given = {"no": False, "yes": True, "none": None, "text": "Falsehood", "quoted": "False"}
     assert split_name(name) == ("X-v0", given)
-    assert name == full_name("X-v0", ("no=false", "yes=true", "none=null", "text=Falsehood", 'quoted="False"'))
+    assert name == full_name(
+        "X-v0", ("no=false", "yes=true", "none=null", "text=Falsehood", 'quoted="False"')
+    )
 
 
 def test_a_variant_is_a_task_of_its_own() -> None:

@@ -115,8 +115,14 @@ def test_gail_teaches_a_ready_made_ppo_the_task() -> None:
         ({"method": "bc"}, "unknown method 'bc'; expected 'gail' or 'airl'"),
         ({"method": "airl", "discriminator": GAILConfig()}, "GAILConfig are no settings of airl"),
         ({"model": lambda: TD3("MlpPolicy", envs(n=1)), "method": "airl"}, "TD3's policy has one action for"),
-        ({"model": lambda: a_sac(use_sde=True), "method": "airl"}, "a SAC of Gaussian actions, without use_s"),
-        ({"model": lambda: a_ppo(use_sde=True), "method": "airl"}, "a PPO of Gaussian actions, without use_s"),
+        (
+            {"model": lambda: a_sac(use_sde=True), "method": "airl"},
+            "a SAC of Gaussian actions, without use_s",
+        ),
+        (
+            {"model": lambda: a_ppo(use_sde=True), "method": "airl"},
+            "a PPO of Gaussian actions, without use_s",
+        ),
         ({"schedule": InterleavedConfig()}, "PPO's schedule is a ScheduleConfig"),
         ({"model": a_sac, "schedule": ScheduleConfig()}, "SAC's schedule is an InterleavedConfig"),
         ({"model": lambda: a_ppo(ent_coef=0.1), "method": "airl"}, "entropy would be paid twice"),

@@ -32,7 +32,9 @@ class OwnDraws(pointmass.PointMass):
 
 
 if "OwnDraws-v0" not in gym.registry:
-    gym.register("OwnDraws-v0", OwnDraws, max_episode_steps=pointmass.STEPS, disable_env_checker=True)
+    gym.register(
+        "OwnDraws-v0", lambda **_: OwnDraws(), max_episode_steps=pointmass.STEPS, disable_env_checker=True
+    )
 
 
 def _played(env_id: str, n_steps: int) -> tuple[RecordingVecEnv, list]:

@@ -171,7 +171,9 @@ def test_a_module_that_a_file_names_is_not_imported(
     assert not (world / "ran").exists()
 
 
-@pytest.mark.parametrize("words", [" ".join(("evaluate run", *LOOK)), "experts list", f"experts evaluate --env-id {TASK}"])
+@pytest.mark.parametrize(
+    "words", [" ".join(("evaluate run", *LOOK)), "experts list", f"experts evaluate --env-id {TASK}"]
+)
 def test_a_card_of_a_module_is_in_nobodys_way_and_imports_nothing(
     words: str, irl: Command, world: Path, evil: str
 ) -> None:

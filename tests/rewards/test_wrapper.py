@@ -111,12 +111,10 @@ def test_a_reset_inside_a_step_is_no_transition() -> None:
     seen = Seen()
     env = RewardWrapper(gym.wrappers.Autoreset(gym.make("PointMass-v0")), seen)
     env.reset(seed=0)
-    action, rewards = np.array([1.0, 0.5], np.float32), []
-    for _ in range(pointmass.STEPS + 1):
-        obs, reward, _, truncated, _ = env.step(action)
-        rewards.append(reward)
-    assert not truncated
-    assert rewards == [1.5] * pointmass.STEPS + [0.0]
+    action = np.array([1.0, 0.5], np.float32)
+    assert [env.step(action)[1] for _ in range(pointmass.STEPS)] == [1.5] * pointmass.STEPS
+    obs, reward, _, truncated, info = env.step(action)
+    assert (reward, truncated, info["own_reward"]) == (0.0, False, 0.0)
     assert len(seen.batches) == pointmass.STEPS
     # the next episode begins at what the reset gave
     assert env.step(action)[1] == 1.5
