@@ -81,8 +81,8 @@ class Replayable(gym.Wrapper):
         raise UserError(
             f"{spec.id if spec else type(self.unwrapped).__name__} was replayed to where it was left, and "
             f"two replays differ: it draws from a generator other than its np_random, so what was begun in "
-            f"it cannot go on; let it draw from self.np_random, which super().reset(seed=seed) seeds, and begin "
-            f"again"
+            f"it cannot go on; let it draw from self.np_random, which super().reset(seed=seed) seeds, and "
+            f"begin again"
         )
 
 
