@@ -99,16 +99,16 @@ def test_results_without_a_score_or_an_interval_are_shown_as_unknown() -> None:
 def test_results_of_another_grid_are_left_out_and_named() -> None:
     grid, cells = grid_of("core")
     results = read_results(BENCHMARKS / "results" / "core", cells)
-    slower = [replace(c, steps=9) if c.name == "gail-ant-d5-s22" else c for c in cells]
+    slower = [replace(c, steps=9) if c.name == "gail-ant-d5-s25" else c for c in cells]
     slower = [cell for cell in slower if cell.name != "bc-ant-d5-s21"]
     kept, notes = comparable(results, slower)
     assert {r["file"] for r in results} - {r["file"] for r in kept} == {
-        "gail-ant-d5-s22.json",
+        "gail-ant-d5-s25.json",
         "bc-ant-d5-s21.json",
     }
     said = section("core", kept, grid, slower, notes)
     assert "31 of 59 cells have no result" in said
-    assert "gail-ant-d5-s22.json: steps was 1000000 and is 9" in said
+    assert "gail-ant-d5-s25.json: steps was 1000000 and is 9" in said
     assert "bc-ant-d5-s21.json: the grid has no such cell" in said
     with pytest.raises(UserError, match="no result is of a cell of grid core as it is now"):
         comparable(results[:1], cells[:1])

@@ -12,25 +12,20 @@ from torch import Tensor
 
 from irl.core import files
 from irl.core.config import from_json, to_json
-from irl.core.errors import UserError
-from irl.core.nets import Normaliser
 from irl.core.records import open_run
-from irl.core.rng import torch_stream
 from irl.core.types import Transitions
 from irl.diagnostics.stack import read_episodes
 from irl.envs.rollouts import rollouts
 from irl.experiment import build, play
 from irl.experiment.cli import main
 from irl.experiment.configs import OFF_POLICY, OFF_POLICY_TD3, RetrainRun, Watch
-from irl.experiment.frozen import frozen
 from irl.learners.ppo import PPOConfig, PPOLearner
 from irl.learners.sac import SACConfig
 from irl.learners.td3 import TD3Config
 from irl.policies.policy import load_policy
-from irl.rewards.artefact import POLICY, load_reward, save_reward
-from irl.rewards.learned import RewardSpec
+from irl.rewards.artefact import POLICY, load_reward
 from irl.rewards.maps import MAPS
-from irl.rewards.nets import LogitNet, LogitSpec
+from irl.rewards.nets import LogitNet
 from tests.experiment.conftest import DATASET, QUICK, TASK
 
 Command = Callable[..., None]
@@ -402,12 +397,3 @@ def test_a_mistake_is_one_line_and_leaves_nothing(
     assert said.err.count("\n") == 1, said.err
     assert [word for word in expected if word not in said.err] == [], said.err
     assert sorted(mistaken.rglob("*")) == before
-
-
-def test_a_choice_of_actions_has_no_entropy_paid_beside_the_reward(tmp_path: Path) -> None:
-    shape = LogitSpec(4, 2, (4,))
-    spec = RewardSpec("CartPole-v1", "gail", "gail", "obs, action", shape, 0.99, 1.0, 128, {})
-    save_reward(tmp_path / "reward", spec, LogitNet(shape, Normaliser(4), torch_stream(0, "net")))
-    assert frozen(settings(PPOConfig(), "CartPole-v1"), tmp_path).spec == spec
-    with pytest.raises(UserError, match=r"a choice of 2; use PPO's own bonus: --ppo.ent-coef 0.5"):
-        frozen(settings(PPOConfig(), "CartPole-v1", entropy=0.5), tmp_path)
