@@ -73,8 +73,9 @@ class RunFolder:
 
     def goes_on(self, env_steps: int, made_by: Mapping[str, Any]) -> None:
         """Add to `environment.json`, as `resumed`, what of it is not as it was before this step."""
-        path = self.path / "environment.json"
-        content = files.read_json(path) if path.is_file() else {}
+        if not (path := self.path / "environment.json").is_file():
+            return
+        content = files.read_json(path)
         if not isinstance(content, dict) or not isinstance(resumed := content.get("resumed", []), list):
             raise UserError(f"{path} is not one that a run writes; take it away, and the run goes on")
         before = dict(content)

@@ -106,7 +106,7 @@ def _check(cells: Sequence[Cell], grid: Path) -> None:
     Raises:
         UserError: names the cell, or the grid whose task is of a module that nobody typed.
     """
-    for task in {cell.task: None for cell in cells}:
+    for task in dict.fromkeys(cell.task for cell in cells):
         check_module(task, str(grid))
     runs = {run.KIND: run for run in get_args(FromDemonstrations)}
     seen = set()

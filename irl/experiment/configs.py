@@ -127,8 +127,7 @@ class AIRLRun(AdversarialRun):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        of = self.discriminator
-        _check_tail(self.learner, of.absorbing_scale if of.terminal == "absorbing" else 0.0)
+        _check_tail(self.learner, self.discriminator.scale)
         if self.discriminator.reward == "f-log-pi" and self.learner.ent_coef > 0:
             raise ValueError(
                 f"entropy would be paid twice: discriminator.reward is f-log-pi and learner.ent_coef is "

@@ -87,6 +87,11 @@ def recorded(config: RetrainRun, reward: LearnedReward, snapshot: Path) -> dict[
     }
 
 
+def is_recorded(before: object, now: dict[str, Any]) -> bool:
+    """Whether a reward.json is of this reward; the run that it came from may have another name by now."""
+    return isinstance(before, dict) and without(before, ("run",)) == without(now, ("run",))
+
+
 def _digest(snapshot: Path) -> str:
     return files.sha256(snapshot / "reward" / WEIGHTS)
 
@@ -106,9 +111,7 @@ def frozen_again(config: RetrainRun, folder: RunFolder) -> LearnedReward:
     before = files.read_json(record := folder.path / RECORD)
     paid = before.get("reward_map") if isinstance(before, dict) else None
     reward = frozen(config, snapshot, paid if paid in (*PARTS, ENTROPIC) else None)
-    now = recorded(config, reward, snapshot)
-    # a run may be renamed
-    if not isinstance(before, dict) or without(before, ("run",)) != without(now, ("run",)):
+    if not is_recorded(before, recorded(config, reward, snapshot)):
         raise UserError(
             f"{snapshot / 'reward'} is not the reward of {record}, which the run was begun with; put that "
             f"back, or begin again with another --out"

@@ -24,7 +24,7 @@ from irl.envs.make import check_module
 from irl.envs.names import split_name
 from irl.envs.rollouts import rollouts
 from irl.experiment.configs import Imitation, RetrainRun
-from irl.experiment.frozen import RECORD, frozen, recorded
+from irl.experiment.frozen import RECORD, frozen, is_recorded, recorded
 from irl.experiment.judge import finite
 from irl.experiment.play import MAY_CHANGE
 from irl.experiment.progress import each_episode, progress
@@ -37,8 +37,6 @@ from irl.policies.policy import load_policy
 
 GATHERED, FORMAT, VERSION = "retrained.json", "irl.retrained", 1
 UNCHANGED, HAND_WRITTEN = "as trained", "hand-written"
-PAYS = ("weights_sha256", "average_over", "reward_map")
-"""Which of reward.json say whether two retrainings are on one reward."""
 KEY = ("snapshot", "part", "env_id", "algorithm", "env_steps", "settings")
 """What two retrainings have in common that are seeds of one row."""
 
@@ -160,9 +158,8 @@ def _still_to_do(command: Retrain, config: RetrainRun, snapshot: Path) -> Retrai
             f"{folder.path} is a run with other settings: {'; '.join(changed):.300}; choose another --out"
         )
     reward = frozen(config, snapshot, command.part)
-    now, then = recorded(config, reward, snapshot), files.read_json(folder.path / RECORD)
-    # a run may be renamed, and another have its name: what counts is what pays
-    if not isinstance(then, dict) or any(then.get(name) != now.get(name) for name in PAYS):
+    # its settings name a run, and another may have had that name
+    if not is_recorded(files.read_json(folder.path / RECORD), recorded(config, reward, snapshot)):
         raise UserError(
             f"{folder.path} is of another reward than {snapshot / 'reward'}; choose another --out, or take "
             f"it away"

@@ -67,6 +67,9 @@ def test_where_a_run_goes_on_by_other_code_is_written_down(run: RunFolder) -> No
     path.write_text('{"resumed": 3}')
     with pytest.raises(UserError, match=r"environment\.json is not one that a run writes"):
         run.goes_on(50, made_by)
+    path.unlink()
+    run.goes_on(50, made_by)
+    assert not path.exists()
 
 
 def test_rows_come_back_in_order(run: RunFolder) -> None:
