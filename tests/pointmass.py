@@ -4,7 +4,7 @@
 
 Staying alive pays nothing, so a reward that only rewards survival teaches nothing. `Cliff-v0` is the same
 but ends the episode where |x_1| > 1, and `NaNReward-v0` is the same with a reward of NaN, `NaNLater-v0`
-from its 700th step on.
+from its 700th step on. The actions of `Far-v0` are around 15.
 """
 
 from typing import Any
@@ -23,10 +23,12 @@ STEPS = 30
 class PointMass(gym.Env):
     """The task of this module; every reset draws a start in [-1, 1]^2."""
 
-    def __init__(self, cliff: float = np.inf, reward: float | None = None, good: int = 0) -> None:
+    def __init__(
+        self, cliff: float = np.inf, reward: float | None = None, good: int = 0, middle: float = 0.0
+    ) -> None:
         self.observation_space = Box(-1.5, 1.5, (2,), np.float64)
-        self.action_space = Box(-1.0, 1.0, (2,), np.float32)
-        self._cliff, self._reward = cliff, reward
+        self.action_space = Box(middle - 1.0, middle + 1.0, (2,), np.float32)
+        self._cliff, self._reward, self._middle = cliff, reward, middle
         self._good = good
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict]:
@@ -36,7 +38,8 @@ class PointMass(gym.Env):
 
     def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict]:
         # noise in the step, so that a replay that forgets the generator is caught
-        push = 0.06 * np.asarray(action, dtype=np.float64) + self.np_random.normal(0.0, 0.01, 2)
+        pushed = np.asarray(action, dtype=np.float64) - self._middle
+        push = 0.06 * pushed + self.np_random.normal(0.0, 0.01, 2)
         self._x = np.clip(self._x + push, -1.5, 1.5)
         by_hand = self._reward is None or self._good > 0
         self._good -= 1
@@ -56,6 +59,7 @@ _register("Cliff-v0", cliff=1.0)
 _register("NaNReward-v0", reward=float("nan"))
 _register("NaNLater-v0", reward=float("nan"), good=700)
 _register("NoReward-v0", reward=0.0)
+_register("Far-v0", middle=15.0)
 
 
 def expert(env_id: str = "PointMass-v0") -> Policy:

@@ -2,12 +2,13 @@
 
 import shlex
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal
 
 from irl.bench.grid import Given, Grid, Part, Peer, Retrain, Train
+from irl.core.config import to_json
 from irl.core.errors import UserError
 from irl.envs.tasks import task_name
 
@@ -41,6 +42,10 @@ class Cell:
     """Of a retraining: who learns."""
     script: str = ""
     """Of a peer's: what its Python runs."""
+    source_steps: int = 0
+    """Of a retraining: how long the run learned whose reward it is."""
+    source_words: tuple[str, ...] = ()
+    """Of a retraining: the method of that run, and all that was asked of it."""
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -68,14 +73,18 @@ def expand(grid: Grid) -> list[Cell]:
             f"grid {grid.name} has two cells called {twice[0]}; give one of their parts a variant"
         )
     _check_arms(grid.name, cells)
-    trained = {cell.name for cell in cells if cell.kind == "train" and cell.method != "bc"}
-    for cell in cells:
-        if cell.kind == "retrain" and cell.source not in trained:
-            raise UserError(
-                f"grid {grid.name} retrains on the reward of {cell.source}, which no part of kind train with "
-                f"a reward makes; add it, with the same variant, task, demos and seed"
-            )
-    return cells
+    trained = {cell.name: cell for cell in cells if cell.kind == "train" and cell.method != "bc"}
+    return [_of_its_source(cell, trained) if cell.kind == "retrain" else cell for cell in cells]
+
+
+def _of_its_source(cell: Cell, trained: Mapping[str, Cell]) -> Cell:
+    """A retraining that says how the reward came about: from other settings it is another cell."""
+    if (source := trained.get(cell.source)) is None:
+        raise UserError(
+            f"grid {cell.grid} retrains on the reward of {cell.source}, which no part of kind train with "
+            f"a reward makes; add it, with the same variant, task, demos and seed"
+        )
+    return replace(cell, source_steps=source.steps, source_words=(source.method, *source.words))
 
 
 def _check_arms(name: str, cells: Sequence[Cell]) -> None:
@@ -132,6 +141,18 @@ def words(settings: dict[str, Any]) -> tuple[str, ...]:
         else:
             found += [f"--{name}", *(str(item) for item in (value if isinstance(value, list) else [value]))]
     return tuple(found)
+
+
+LATER = ("source_steps", "source_words")
+"""What cells that were written down long ago do not say."""
+
+
+def completed(written: Any, cell: Cell) -> Any:
+    """A cell that was written down, with what it could not say yet as `cell` says it."""
+    if not isinstance(written, Mapping):
+        return written
+    asked = to_json(cell)
+    return {**written, **{name: asked[name] for name in LATER if name not in written}}
 
 
 def only(cells: Sequence[Cell], wanted: Sequence[str]) -> list[Cell]:

@@ -1,11 +1,9 @@
 """The commands of cells as processes of their own, a thread of arithmetic each."""
 
-import fcntl
 import os
 import signal
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -55,12 +53,3 @@ class Processes:
             self._stopped = True
             for process in self._running:
                 process.send_signal(signal.SIGTERM)
-
-
-@contextmanager
-def held(path: Path) -> Iterator[None]:
-    """One process at a time; the system lets go when this one dies."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

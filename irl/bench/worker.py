@@ -1,6 +1,7 @@
 """One cell carried out, from wherever it was left, by commands of irl."""
 
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from irl.bench import results
-from irl.bench.cells import Cell
+from irl.bench.cells import Cell, completed
 from irl.bench.leash import PROGRAM, script
-from irl.bench.processes import Processes, held
+from irl.bench.processes import Processes
 from irl.core import files
 from irl.core.config import to_json
 from irl.core.differences import differences
@@ -19,6 +20,8 @@ from irl.core.records import open_run
 from irl.demos.load import load_demos
 from irl.envs.tasks import task_name
 from irl.policies import shelf
+from irl.rewards.artefact import WEIGHTS
+from irl.rewards.averaged import so_far
 
 DATASET = ("--episodes", "25", "--seed", "0")
 """The expert's episodes, of which each cell draws its own."""
@@ -106,8 +109,9 @@ def _retrain(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]
             f"{source / 'evaluation.json'} is not of the run's last snapshot; make it again: irl evaluate "
             f"{source} --frames 0"
         )
-    there = list(open_run(source).snapshots())
-    snapshot = min(there, key=lambda step: abs(step - cell.share * there[-1]))
+    there = open_run(source).snapshots()
+    snapshot = min(there, key=lambda step: abs(step - cell.share * max(there)))
+    _same_reward(run, there, snapshot)
     if not (run / "retrain.json").is_file():
         if (run / "config.json").is_file():
             _irl(cell, places, processes, "retrain", "--resume", str(run))
@@ -115,6 +119,26 @@ def _retrain(cell: Cell, places: Places, processes: Processes) -> dict[str, Any]
             where = ("--snapshot", str(snapshot), "--out", str(run))
             _irl(cell, places, processes, "retrain", str(source), *where, *cell.words)
     return results.of_retraining(cell, run, source, snapshot)
+
+
+def _same_reward(run: Path, snapshots: Mapping[int, Path], snapshot: int) -> None:
+    """Refuse a retraining that was begun on another reward than the source has at this snapshot by now."""
+    result, begun = run / "retrain.json", run / "reward.json"
+    if not result.is_file() and not begun.is_file():
+        return
+    said = files.read_json(result)["reward"] if result.is_file() else files.read_json(begun)
+    now: dict[str, Any] = {"env_steps": snapshot, "weights_sha256": _digest(snapshots[snapshot])}
+    if "average_over" in said:
+        now["average_over"] = {str(at): _digest(of) for at, of in so_far(snapshots, snapshot).items()}
+    if changed := differences({name: said.get(name) for name in now}, now):
+        raise UserError(
+            f"{run} is a retraining on another reward than {snapshots[snapshot] / 'reward'}: "
+            f"{'; '.join(changed):.300}; take it away, and it is made again"
+        )
+
+
+def _digest(snapshot: Path) -> str:
+    return files.sha256(snapshot / "reward" / WEIGHTS)
 
 
 def _judged_at_its_end(run: Path) -> bool:
@@ -143,7 +167,7 @@ def dataset(task: str, places: Places, processes: Processes) -> None:
     name = task_name(task)
     folder = places.datasets / "irl" / name / "expert-v0"
     log = places.runs / f"dataset-{name}.log"
-    with held(places.datasets / f".{name}.lock"):
+    with files.held(places.datasets / f".{name}.lock"):
         if (folder / "data").is_dir():
             return
         # as the command would refuse it, without starting one for each cell
@@ -170,7 +194,9 @@ def _arrays(cell: Cell, places: Places, run: Path) -> Path:
 def _same_cell(cell: Cell, places: Places) -> None:
     """Go on with a run only where it is of this cell; write down what it is of."""
     path, asked = places.runs / f"{cell.name}.cell.json", to_json(cell)
-    if path.is_file() and (changed := differences(files.read_json(path), asked)):
+    # without a run it is of one that never began, or was taken away
+    begun = path.is_file() and (places.runs / cell.name).exists()
+    if begun and (changed := differences(completed(files.read_json(path), cell), asked)):
         raise UserError(
             f"the run {cell.name} was begun as another cell: {'; '.join(changed):.300}; take it out of "
             f"{places.runs}, or give the grid or the part another name"

@@ -3,6 +3,7 @@
 Everything is written aside, flushed to the disk, and renamed into place.
 """
 
+import fcntl
 import hashlib
 import json
 import os
@@ -132,6 +133,15 @@ def check_room(folder: Path, size: int) -> None:
 
 class _Undone(Exception):
     """Ends a block of `new_folder` whose folder is not wanted."""
+
+
+@contextmanager
+def held(path: Path) -> Iterator[None]:
+    """One process at a time, the others wait; the system lets go when this one dies."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def sha256(path: Path) -> str:

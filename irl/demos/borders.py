@@ -17,7 +17,7 @@ import numpy as np
 
 from irl.core.errors import UserError
 from irl.demos.episodes import Columns
-from irl.demos.sources import Source
+from irl.demos.sources import NAMES, Source
 
 CLOSE = 1e-5
 """How far a next observation may be from the next row, beside the rounding of float32."""
@@ -25,7 +25,9 @@ NO_REASONS = (
     "nothing says why episodes end: all count as cut off by a time limit; an array `terminals` says where "
     "the task ended them"
 )
-_ONE_EACH = ("rewards", "terminated", "truncated", "episode", "step", "starts")
+_FLAGS = ("terminated", "truncated", "starts")
+_COUNTS = ("episode", "step")
+_ONE_EACH = ("rewards", *_FLAGS, *_COUNTS)
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,10 @@ def split_episodes(source: Source) -> Split:
     Rewards that were not recorded are NaN; actions that were not, have no column.
 
     Raises:
-        UserError: arrays of different lengths, no borders, or rows out of order; names episode and step.
+        UserError: arrays of different lengths, no borders, a flag that is not 0 or 1, or rows out of order;
+            names episode and step, or the row.
     """
+    _check_values(source.arrays)
     source = _flattened(source)
     arrays, n = source.arrays, _steps(source.arrays)
     for name, values in {**arrays, **source.infos}.items():
@@ -71,6 +75,21 @@ def split_episodes(source: Source) -> Split:
         for obs, (start, stop) in zip(observations, bounds, strict=True)
     ]
     return Split(episodes, tuple(notes))
+
+
+def _check_values(arrays: Mapping[str, np.ndarray]) -> None:
+    """Refuse flags, episodes and steps that say nothing: NaN, true and equal to none, would end episodes."""
+    for name in (*_FLAGS, *_COUNTS):
+        values = arrays.get(name, np.zeros(0))
+        good = (values == 0) | (values == 1) if name in _FLAGS else np.isfinite(values)
+        if not good.all():
+            row, *column = place = tuple(int(i) for i in np.argwhere(~good)[0])
+            where = f"row {row}, column {column[0]}," if column else f"row {row}"
+            expected = "0 or 1" if name in _FLAGS else "a finite number"
+            raise UserError(
+                f"it has {values[place]:g} in {where} of {name} (the array {' or '.join(NAMES[name])}); "
+                f"expected {expected} for each step"
+            )
 
 
 def _left_out(arrays: Mapping[str, np.ndarray], bounds: list[tuple[int, int]]) -> str:

@@ -1,5 +1,6 @@
 """Datasets out of datasets: several as one, or one as two."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from irl.demos.storage import open_dataset, read_episodes
 from irl.demos.write import Labels, Origin, check_target, write
 from irl.envs.discrete import OneHot
 from irl.envs.flatten import part_names
+from irl.envs.names import OBS_KEYS
 
 
 def merge(
@@ -114,7 +116,15 @@ def _write_part(
 def _origin(dataset: Dataset) -> Origin:
     space = dataset.action_space
     action_space = OneHot(space) if isinstance(space, Discrete) else space
-    return Origin(dataset.obs_space, action_space, dataset.env_id, dataset.env_spec)
+    return Origin(dataset.obs_space, action_space, dataset.env_id, _spec(dataset))
+
+
+def _spec(dataset: Dataset) -> str | None:
+    """What it says of its environment, with the parts of the observations that are in a row from here on."""
+    if dataset.env_spec is None or not dataset.obs_keys:
+        return dataset.env_spec
+    content = json.loads(dataset.env_spec)
+    return json.dumps(content | {"kwargs": content.get("kwargs", {}) | {OBS_KEYS: list(dataset.obs_keys)}})
 
 
 def _same(values: list[Any]) -> Any:

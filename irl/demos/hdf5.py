@@ -1,12 +1,15 @@
 """The episodes in Minari's HDF5 file, read without running anything that the file names."""
 
 import math
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
+from irl.core.errors import UserError
 from irl.core.types import Episode
 from irl.demos.episodes import Columns, Layout, to_episode
 
@@ -32,6 +35,32 @@ def read(path: Path, n: int, layout: Layout) -> list[Episode]:
             raise ValueError(f"the metadata say {n} episodes, the file has {len(file)}")
         check_links(file, path.stat().st_size)
         return [to_episode(_columns(file, i, layout), i, layout) for i in range(n)]
+
+
+def stored_key(key: object) -> str:
+    """What an `info` key is called in a file, where a `/` would make a group: %2F; `key_of` undoes it.
+
+    >>> stored_key("reward/ctrl")
+    'reward%2Fctrl'
+
+    Raises:
+        UserError: HDF5 has no such name.
+    """
+    if not isinstance(key, str) or key in ("", ".") or "\0" in key:
+        raise UserError(
+            f"the info has the key {key!r:.40}, which HDF5 has no name for; expected text: have the "
+            f"environment call it e.g. 'speed'"
+        )
+    return re.sub("%(?=2F|25)", "%25", key).replace("/", "%2F")
+
+
+def key_of(name: str) -> str:
+    """The `info` key that is called so in a file, or lies there in groups.
+
+    >>> key_of("reward%2Fctrl"), key_of("reward/ctrl")
+    ('reward/ctrl', 'reward/ctrl')
+    """
+    return re.sub("%(2F|25)", lambda found: "/" if found[1] == "2F" else "%", name)
 
 
 def check_links(file: h5py.File, size: int) -> None:
@@ -62,14 +91,23 @@ def _columns(file: h5py.File, index: int, layout: Layout) -> Columns:
     if not isinstance(group, h5py.Group):
         raise ValueError(f"episode_{index} is not a group of the file")
     infos, seed = group.get("infos"), group.attrs.get("seed")
-    known = infos.items() if isinstance(infos, h5py.Group) else ()
     of_keys = {key: _array(group, f"observations/{key}", index) for key in layout.obs_keys}
     return Columns(
         of_keys or _array(group, "observations", index),
         *(_array(group, name, index) for name in ("actions", "rewards", "terminations", "truncations")),
-        infos={key: np.asarray(item[()]) for key, item in known if isinstance(item, h5py.Dataset)},
+        infos=dict(_infos(infos)) if isinstance(infos, h5py.Group) else {},
         seed=int(seed) if isinstance(seed, np.integer) else None,
     )
+
+
+def _infos(group: h5py.Group) -> Iterator[tuple[str, np.ndarray]]:
+    """Every column below the group: other recorders nest them, or make groups of a key with a `/`."""
+    names: list[str] = []
+    # it goes into a group once, also where that is linked into itself
+    group.visititems_links(lambda name, _: names.append(name))
+    for name in names:
+        if isinstance(item := group[name], h5py.Dataset):
+            yield key_of(name), np.asarray(item[()])
 
 
 def _array(group: h5py.Group, name: str, index: int) -> np.ndarray:

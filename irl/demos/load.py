@@ -16,6 +16,7 @@ from irl.demos.metadata import env_name
 from irl.demos.storage import open_dataset, read_episodes
 from irl.demos.write import origin_of
 from irl.envs.flatten import part_names
+from irl.envs.names import other_parts
 from irl.envs.tasks import task_of
 
 
@@ -133,22 +134,30 @@ def check_task(demos: Demos, env: gym.Env, *, seen: bool = True) -> None:
             f"demonstrations of {shown} are not of {wanted}, though both have observations of {has[0]} and "
             f"actions of {has[1]}"
         )
+    name = env_name(origin_of(env).env_spec)
+    if name and demos.env_name and other_parts(demos.env_name, name):
+        raise UserError(
+            f"demonstrations {demos.dataset_id} are of {demos.env_name:.300}, training is in {name:.300}: "
+            f"other parts of the observations; name the demonstrations' with --env-kwargs"
+        )
     if has[1]:
         _check_actions(demos, wanted, env.action_space)
 
 
 def other_variant(demos: Demos, env: gym.Env) -> str | None:
-    """A line where the demonstrations are of `env`'s task with other arguments; None where they are not.
+    """A line where demonstrations are of another task of the same shapes, or of `env`'s with other arguments.
 
-    They are not refused: learning across rewards or dynamics is a question of its own.
+    None where they are not, or where it is not known. They are not refused: learning across versions, rewards
+    or dynamics is a question of its own.
     """
     wanted = env_name(origin_of(env).env_spec)
-    same_id = env.spec is not None and demos.env_id == env.spec.id
-    if not same_id or demos.env_name == wanted:
+    if env.spec is None or wanted is None or demos.env_name in (None, wanted):
         return None
+    same = demos.env_id == env.spec.id
+    mend = "the demonstrations' arguments with --env-kwargs" if same else "other demonstrations with --demos"
     return (
         f"demonstrations {demos.dataset_id} are of {demos.env_name:.300}, training is in {wanted:.300}; "
-        f"where that is not meant, name the demonstrations' arguments with --env-kwargs"
+        f"where that is not meant, name {mend}"
     )
 
 

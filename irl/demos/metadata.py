@@ -19,7 +19,7 @@ from irl.demos.episodes import Layout
 from irl.demos.recording import Recorded
 from irl.envs.flatten import flat_space
 from irl.envs.make import check_flat
-from irl.envs.names import full_name
+from irl.envs.names import OBS_KEYS, full_name
 from irl.envs.tasks import task_of
 
 METADATA = "metadata.json"
@@ -97,7 +97,7 @@ def parse(dataset_id: str, path: Path, content: Any, obs_keys: tuple[str, ...]) 
         action_space=_action_space(metadata),
         episodes=from_json(int, metadata.get("total_episodes"), f"{METADATA}.total_episodes"),
         env_id=_env_id(spec := optional(str, "env_spec")),
-        env_name=env_name(spec),
+        env_name=env_name(spec, obs_keys),
         env_spec=spec,
         algorithm=optional(str, "algorithm_name"),
         author=_author(metadata.get("author")),
@@ -154,8 +154,11 @@ def _env_id(spec: str | None) -> str | None:
     return env_id
 
 
-def env_name(spec: str | None) -> str | None:
+def env_name(spec: str | None, obs_keys: tuple[str, ...] = ()) -> str | None:
     """The full name of the task that an `env_spec` is of; its arguments are compared and shown, never used.
+
+    Args:
+        obs_keys: parts of a dictionary of observations that are put in a row on reading.
 
     Raises:
         UserError, ValueError: it is no JSON, names no id that is one, or its arguments are no object.
@@ -169,4 +172,6 @@ def env_name(spec: str | None) -> str | None:
     # how it is looked at is no part of the task
     usual["render_mode"] = json.dumps(given.get("render_mode"))
     shown = {name: value for name, value in given.items() if json.dumps(value) != usual.get(name)}
+    if obs_keys:
+        shown[OBS_KEYS] = list(obs_keys)
     return full_name(env_id, (json.dumps(shown),))

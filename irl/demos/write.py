@@ -21,7 +21,7 @@ from irl.core import files
 from irl.core.config import to_json
 from irl.core.errors import UserError
 from irl.core.types import Episode
-from irl.demos.hdf5 import DATA
+from irl.demos.hdf5 import DATA, stored_key
 from irl.demos.metadata import DIGEST, METADATA, RECORDED
 from irl.demos.recording import Recorded
 from irl.demos.root import datasets_root, minari_at
@@ -117,14 +117,14 @@ def write(
 ) -> None:
     """Write the dataset to the folder that `check_target` gave.
 
-    Every number of an episode is under `infos` with its own `info` key, first the row of the reset, as
-    Minari has it: there a reward term is 0 and what the reset does not tell is NaN.
+    Every number of an episode is under `infos` with its own `info` key (a `/` in it as %2F), first the row of
+    the reset, as Minari has it: there a reward term is 0 and what the reset does not tell is NaN.
 
     Args:
         resets: the scalar numbers in the info of each episode's reset, where they are known.
 
     Raises:
-        UserError: it cannot be written.
+        UserError: it cannot be written, or an `info` key is no text.
     """
     at_reset = resets or [{}] * len(episodes)
     buffers = [_buffer(e, r, origin) for e, r in zip(episodes, at_reset, strict=True)]
@@ -205,7 +205,7 @@ def _buffer(episode: Episode, at_reset: Mapping[str, float], origin: Origin) -> 
         rewards=episode.reward,  # pyright: ignore[reportArgumentType]
         terminations=ended & episode.terminated,  # pyright: ignore[reportArgumentType]
         truncations=ended & episode.truncated,  # pyright: ignore[reportArgumentType]
-        infos=infos or None,
+        infos={stored_key(key): values for key, values in infos.items()} or None,
     )
 
 

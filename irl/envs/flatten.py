@@ -1,6 +1,7 @@
 """Observations in a dictionary as one row: the named parts, in the order they are named."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import gymnasium as gym
@@ -10,9 +11,7 @@ from gymnasium.spaces import Box, Dict
 from jaxtyping import Float
 
 from irl.core.errors import UserError
-
-OBS_KEYS = "obs_keys"
-"""Argument of a task's full name (`irl.envs.names`) that names the parts."""
+from irl.envs.names import OBS_KEYS
 
 
 def part_names(given: object) -> tuple[str, ...]:
@@ -79,8 +78,12 @@ class FlatKeys(gym.ObservationWrapper):
 
     @property
     def spec(self) -> EnvSpec | None:
-        """That of the environment inside."""
-        return self.env.spec
+        """That of the environment inside, and the parts: a dataset names the task by it."""
+        if (inner := self.env.spec) is None:
+            return None
+        spec = copy(inner)
+        spec.kwargs = {**inner.kwargs, OBS_KEYS: list(self._keys)}
+        return spec
 
     def observation(self, observation: Mapping[str, Any]) -> np.ndarray:
         """The row."""

@@ -1,5 +1,6 @@
 """What an environment does wrong, said in one line: which one, when, and what it did."""
 
+from numbers import Real
 from typing import Any
 
 import gymnasium as gym
@@ -12,7 +13,7 @@ from irl.core.errors import UserError
 class Guarded(gym.Wrapper):
     """Refuses an environment that raises, or whose observations are not finite numbers of its own shape.
 
-    Its reward is not looked at: whoever needs it says so. Cost: 2 microseconds a step.
+    A reward has to be one number; which, whoever needs it says. Cost: 2 microseconds a step.
     """
 
     def __init__(self, env: gym.Env, env_id: str) -> None:
@@ -49,6 +50,11 @@ class Guarded(gym.Wrapper):
             obs, reward, terminated, truncated, info = self.env.step(action)
         except Exception as error:
             raise self._raised("step", error, action) from error
+        if not isinstance(reward, Real) and (shape := np.shape(np.asarray(reward))):
+            raise UserError(
+                f"{self._id} gave a reward of shape {shape} after step {self._steps}{self._of_seed()}; "
+                f"expected one number: mend the environment, e.g. reward[0]"
+            )
         self.check(obs, self._steps, action)
         self._steps += 1
         return obs, reward, terminated, truncated, info

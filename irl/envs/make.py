@@ -18,10 +18,10 @@ from gymnasium.spaces import Box, Dict, Discrete
 
 from irl.core.errors import UserError
 from irl.envs.discrete import OneHotActions
-from irl.envs.dynamics import DYNAMICS, MODEL, changed_model
-from irl.envs.flatten import OBS_KEYS, FlatKeys, part_names
+from irl.envs.dynamics import DYNAMICS, MODEL, changed_model, check_felt
+from irl.envs.flatten import FlatKeys, part_names
 from irl.envs.guard import Guarded
-from irl.envs.names import split_name
+from irl.envs.names import OBS_KEYS, split_name
 
 VARIABLE = "IRL_ENV_MODULES"
 """Environment variable that names the modules which a file may have imported."""
@@ -75,6 +75,11 @@ def _under(changes: object, env_id: str, kwargs: dict[str, Any]) -> gym.Env:
         )
     with changed_model(env_id, changes) as model:
         env = _made(env_id, kwargs | model)
+    try:
+        check_felt(env, env_id, changes)
+    except UserError:
+        env.close()
+        raise
     if (spec := env.unwrapped.spec) is not None:
         del spec.kwargs[MODEL]
         spec.kwargs[DYNAMICS] = changes

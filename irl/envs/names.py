@@ -15,6 +15,9 @@ from typing import Any
 
 from irl.core.errors import UserError
 
+OBS_KEYS = "obs_keys"
+"""Argument that names the parts of a dictionary of observations (`irl.envs.flatten`)."""
+
 _PYTHON: dict[str, Any] = {"True": True, "False": False, "None": None}
 """Python's own words for what JSON has: as text, each would be true where it is asked."""
 
@@ -29,6 +32,12 @@ def split_name(name: str) -> tuple[str, dict[str, Any]]:
     """
     env_id, mark, content = name.partition("?")
     return env_id, _object(content, f"what follows the ? in {name!r:.120}") if mark else {}
+
+
+def other_parts(a: str, b: str) -> bool:
+    """Whether two full names put other parts of a dictionary of observations in a row, or these otherwise."""
+    first, second = (split_name(name)[1].get(OBS_KEYS) for name in (a, b))
+    return first is not None and second is not None and first != second
 
 
 def full_name(env_id: str, words: Sequence[str]) -> str:

@@ -39,5 +39,6 @@ def evaluation_of_cloned(
         "policy": measure(policy),
         "references": references,
         "reward": {"notes": [NO_REWARD]},
+        "distances_reason": NO_REWARD,
         "drift": {"changes_reason": NO_REWARD},
     }

@@ -1,20 +1,24 @@
 """Which demonstrations a run learns from: drawn once, written down, and the same ever after."""
 
+import hashlib
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from gymnasium.spaces import Box
 
 from irl.core import files
 from irl.core.errors import UserError
 from irl.core.records import RunFolder
+from irl.core.types import Episode
 from irl.demos.load import Demos, check_task, load_demos, other_variant
 from irl.discriminators.airl import AIRLConfig
-from irl.envs.flatten import OBS_KEYS, part_names
+from irl.envs.flatten import part_names
 from irl.envs.make import check_module, make
-from irl.envs.names import split_name
-from irl.experiment.build import check_discriminator, check_learner
+from irl.envs.names import OBS_KEYS, split_name
+from irl.experiment.build import check_discriminator, check_learner, demonstrations
 from irl.experiment.configs import BCRun, FromDemonstrations, OffPolicyRun
 from irl.experiment.judge import finite
 
@@ -39,6 +43,7 @@ def _drawn_of(config: FromDemonstrations, root: Path | None, *, warn: bool = Fal
         if not isinstance(config, BCRun):
             check_discriminator(config.discriminator, env)
         check_task(demos, env, seen=_sees_actions(config))
+        _check_rate(config, demos)
         env.reset(seed=config.seed)
         box = env.action_space
         assert isinstance(box, Box)
@@ -62,6 +67,17 @@ def _sees_actions(config: FromDemonstrations) -> bool:
     return "action" in config.discriminator.inputs or isinstance(config.discriminator, AIRLConfig)
 
 
+def _check_rate(config: FromDemonstrations, demos: Demos) -> None:
+    try:
+        demonstrations(config, demos.episodes)
+    except ValueError as error:
+        longest = max(len(episode) for episode in demos)
+        raise UserError(
+            f"{error}: the longest has {longest} steps, and where each begins is drawn; take a smaller "
+            f"--demo-rate than {config.demo_rate}, or more --demo-episodes"
+        ) from error
+
+
 def _loaded(config: FromDemonstrations, root: Path | None) -> Demos:
     given = {"episodes": config.demo_episodes, "seed": config.seed, "root": root}
     try:
@@ -83,7 +99,20 @@ def drawn(demos: Demos) -> dict[str, Any]:
         # None: not recorded
         "returns": [finite(episode.return_) for episode in demos],
         "held_out_returns": [finite(episode.return_) for episode in demos.held_out],
+        # returns may be the same, or none, of other episodes
+        "sha256": _digest((*demos.episodes, *demos.held_out)),
     }
+
+
+def _digest(episodes: Sequence[Episode]) -> str:
+    """SHA-256 of every number of the episodes that something is learned from or judged by."""
+    digest = hashlib.sha256()
+    for episode in episodes:
+        for column in (episode.obs, episode.action, episode.reward):
+            digest.update(repr(column.shape).encode())
+            digest.update(np.asarray(column, dtype=np.float64).tobytes())
+        digest.update(bytes([episode.terminated, episode.truncated]))
+    return digest.hexdigest()
 
 
 def drawn_again(config: FromDemonstrations, folder: RunFolder, root: Path | None = None) -> Demos:
@@ -100,7 +129,9 @@ def drawn_again(config: FromDemonstrations, folder: RunFolder, root: Path | None
         )
     before = files.read_json(record)
     demos = _drawn_of(config, root or config.datasets_root)
-    if drawn(demos) != before:
+    now = drawn(demos)
+    # an older record has no digest
+    if before != {key: value for key, value in now.items() if key in before or key != "sha256"}:
         raise UserError(
             f"{config.demos} in {demos.path} is not the dataset of {record}, which the run was begun with; "
             f"name the folder that holds it with --datasets-root, or set MINARI_DATASETS_PATH"

@@ -40,6 +40,8 @@ from irl.report.tables import evaluation_table
 EVALUATION = "evaluation.json"
 """The one that the report shows."""
 NO_RETURN = "the task's own reward is not a finite number"
+NO_REFERENCE = "no expert or random return is known for this task"
+NO_SCALE = "the expert's return and that of random actions are equal, so there is no scale between them"
 
 
 @dataclass(frozen=True)
@@ -179,7 +181,7 @@ def _policy(episodes: Sequence[Episode], references: dict[str, Any]) -> dict[str
         expert["return_mean"] if expert else None,
     )
     known = np.isfinite(measured.return_mean)
-    unscored = "no expert or random return is known for this task" if known else NO_RETURN
+    unscored = NO_RETURN if not known else NO_SCALE if random and expert else NO_REFERENCE
     return {
         "return_mean": finite(measured.return_mean),
         "return_mean_reason": None if known else NO_RETURN,

@@ -69,8 +69,13 @@ class TrainExpert:
 
 
 def train(command: TrainExpert) -> None:
-    """Train, measure, write policy and card into the run folder, and shelve them."""
+    """Train, measure, write policy and card into the run folder, and shelve them.
+
+    Raises:
+        UserError: the place on the shelf is another task's, or the settings do not go together.
+    """
     run = _resumed(command) if command.resume is not None else _expert_run(command)
+    shelf.check_place(_place(run, command), run.env_id)
     env = make(run.env_id)
     try:
         build.check_learner(run.learner.KIND, env)
@@ -143,6 +148,11 @@ def _open_or_create(run: ExpertRun) -> records.RunFolder:
     return records.create(run.out, config, environment(command_line(), run.device))
 
 
+def _place(run: ExpertRun, command: TrainExpert) -> Path:
+    """Where on the shelf the policy goes."""
+    return shelf.writable_root(command.policies_root) / task_name(run.env_id) / run.level
+
+
 def _shelve(run: ExpertRun, policy: Policy, steps: int, train_s: float, command: TrainExpert) -> None:
     console = Console()
     measured = measured_of(run.env_id, policy, EPISODES, 0)
@@ -163,7 +173,8 @@ def _shelve(run: ExpertRun, policy: Policy, steps: int, train_s: float, command:
     )
     shelf.write(run.out / "policy", policy, card)
     console.print(shelf_table([Row(card, measured, run.out / "policy")]))
-    place = shelf.writable_root(command.policies_root) / task_name(run.env_id) / run.level
+    # once more: another training may have come first
+    shelf.check_place(place := _place(run, command), run.env_id)
     if (place / shelf.CARD).is_file() and not command.overwrite:
         console.print(f"{place} holds a policy already; kept. The new one is in {run.out / 'policy'}")
         return

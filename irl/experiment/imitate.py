@@ -16,10 +16,13 @@ from irl.algorithms.loop import Round
 from irl.core.nets import fitted_normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Episode, Transitions, from_episodes
+from irl.demos.bounds import first_outside
+from irl.demos.load import Demos
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.discriminators.ensemble import Ensemble, one_or_several
 from irl.discriminators.gail import GAIL, GAILConfig
 from irl.envs.absorbing import absorb
+from irl.envs.tasks import task_of
 from irl.learners.ready import ReadyPPO, ReadySAC, ready
 from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.nets import SEES
@@ -61,9 +64,13 @@ def imitate(
     """
     if method not in ("gail", "airl"):
         raise ValueError(_refused(method))
+    # no round at all would leave a reward that nothing has taught
+    if steps < 1:
+        raise ValueError(f"steps must be at least 1, not {steps}")
     expert = from_episodes(demos)
     settings = discriminator or _defaults(method, type(model).__name__)
     _check(model, expert, method, settings)
+    _check_demonstrations(model, demos)
     scale = settings.scale if isinstance(settings, AIRLConfig) else settings.absorbing_scale
     learner = ready(model, steps, absorbing=scale > 0)
     try:
@@ -121,6 +128,26 @@ def _check(model: Any, expert: Transitions, method: str, settings: GAILConfig | 
             "entropy would be paid twice: by the model's ent_coef and by reward='f-log-pi'; use "
             "AIRLConfig(reward='f'), or a PPO with ent_coef=0"
         )
+
+
+def _check_demonstrations(model: Any, demos: Sequence[Episode]) -> None:
+    """Refuse what `irl train` does: actions that the task does not take, and another task of its shapes."""
+    box = model.action_space
+    for number, episode in enumerate(demos):
+        if (place := first_outside(episode.action, box)) is not None:
+            step, column = place
+            raise ValueError(
+                f"episode {number} of the demonstrations has the action {float(episode.action[place])!r} in "
+                f"column {column} at step {step}, the model takes {box.low[column]:g} to "
+                f"{box.high[column]:g}; record actions as the environment gets them, clipped"
+            )
+    envs = model.get_env()
+    spec = envs.get_attr("spec")[0] if envs is not None else None
+    its = demos.env_id if isinstance(demos, Demos) else None
+    if spec is None or its is None or its == spec.id:
+        return
+    if task_of(its) is not None and task_of(spec.id) is not None:
+        raise ValueError(f"the demonstrations are of {its}, the model learns {spec.id}")
 
 
 def _discriminator(
@@ -184,4 +211,5 @@ def _reward(
         env_steps=learner.env_steps,
         provenance={"seed": seed},
     )
-    return LearnedReward(spec, judge.net)
+    # as `load_reward` gives it: who asks it next has batches of numpy's
+    return LearnedReward(spec, judge.net).to("cpu")

@@ -110,6 +110,8 @@ class ImitationRun:
             env_id=env_id,
             env_kwargs=(),
             demos=self.demos or f"irl/{task}/expert-v0",
+            # a run may go on from another folder
+            datasets_root=self.datasets_root and self.datasets_root.expanduser().absolute(),
             out=self.out or Path("runs") / f"{self.KIND}-{task}-s{self.seed}",
         )
 

@@ -57,14 +57,18 @@ def retrain(command: Retrain) -> None:
     # every folder is looked at before anything is trained
     configs = [settled(one, its, step) for one in one_by_one]
     ahead = [_still_to_do(one, config, snapshot) for one, config in zip(one_by_one, configs, strict=True)]
-    before = _rows(source.path / GATHERED)
+    _rows(source.path / GATHERED)
     for one in ahead:
         if one is not None:
             retrain_one(one)
     results = [_result(config) for config in configs]
-    row = gathered(before, results, (its.env_id, configs[0].env_id), snapshot, command.policies_root)
-    rows = [old for old in before if not _is_same(old, row)] + [row]
-    files.write_json(source.path / GATHERED, {"format": FORMAT, "version": VERSION, "rows": rows})
+    tasks = its.env_id, configs[0].env_id
+    with files.held(source.path / f".{GATHERED}.lock"):
+        # read again: hours have passed, in which another command may have added its row
+        before = _rows(source.path / GATHERED)
+        row = gathered(before, results, tasks, snapshot, command.policies_root)
+        rows = [old for old in before if not _is_same(old, row)] + [row]
+        files.write_json(source.path / GATHERED, {"format": FORMAT, "version": VERSION, "rows": rows})
     Console().print(_said(row), highlight=False, markup=False, soft_wrap=True)
 
 

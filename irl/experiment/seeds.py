@@ -28,10 +28,10 @@ from irl.experiment.configs import FromDemonstrations
 from irl.experiment.judge import finite
 from irl.experiment.play import MAY_CHANGE
 from irl.policies import shelf
-from irl.policies.card import normalised_score
+from irl.policies.card import Card, normalised_score
 
 SUMMARY = "seeds.json"
-NOT_EVALUATED = "the run ended without an evaluation: --watch.eval-episodes is 0"
+NOT_EVALUATED = "a run ended without an evaluation: it was begun with --watch.eval-episodes 0"
 NOT_FINITE = "a return is not a finite number"
 ONE_SEED = "one seed says nothing of another"
 
@@ -79,39 +79,46 @@ def summary(config: FromDemonstrations, runs: Sequence[RunFolder]) -> dict[str, 
     """What `seeds.json` holds: every seed singly, then the score, or where it is unknown the return."""
     env_id = config.resolved().env_id
     card = shelf.expert_card(env_id, None)
-    rows = []
-    for run, seed in zip(runs, config.seed_numbers, strict=True):
-        last = run.metrics()[-1]
-        value = last.get("eval_return_mean")
-        score = None
-        if value is not None and card is not None:
-            score = normalised_score(value, card.random_return_mean, card.measured.return_mean)
-        rows.append(
-            {
-                "seed": seed,
-                "run": run.path.name,
-                "env_steps": last["env_steps"],
-                "eval_return_mean": value,
-                "score": None if score is None else finite(score),
-            }
-        )
+    if card is not None and card.random_return_mean == card.measured.return_mean:
+        # between equal returns there is no scale
+        card = None
+    rows = [_row(run, seed, card) for run, seed in zip(runs, config.seed_numbers, strict=True)]
+    played = sorted({row["evaluation_episodes"] for row in rows})
     measured = "score" if card is not None else "eval_return_mean"
     values = np.array([np.nan if row[measured] is None else row[measured] for row in rows])
     low, high = iqm_interval(values, stream(0, "seeds"))
     reason = ONE_SEED if len(values) < 2 else None
     if np.isnan(values).any():
-        reason = NOT_FINITE if config.watch.eval_episodes else NOT_EVALUATED
+        reason = NOT_FINITE if all(played) else NOT_EVALUATED
     return {
         "format": "irl.seeds",
         "version": 1,
         "method": config.KIND,
         "env_id": env_id,
-        "evaluation_episodes": config.watch.eval_episodes,
+        "evaluation_episodes": played[0] if len(played) == 1 else played,
         "measured": measured,
         "seeds": rows,
         "iqm": finite(iqm(values)),
         "interval_95": [finite(low), finite(high)],
         "interval_95_reason": reason,
+    }
+
+
+def _row(run: RunFolder, seed: int, card: Card | None) -> dict[str, Any]:
+    """What `seeds.json` says of one seed."""
+    last = run.metrics()[-1]
+    value, score = last.get("eval_return_mean"), None
+    if value is not None and card is not None:
+        score = normalised_score(value, card.random_return_mean, card.measured.return_mean)
+    # the run's own: one that was there already is not evaluated again with what is typed now
+    begun = from_json(FromDemonstrations, run.config, str(run.path / "config.json"))
+    return {
+        "seed": seed,
+        "run": run.path.name,
+        "env_steps": last["env_steps"],
+        "eval_return_mean": value,
+        "evaluation_episodes": begun.watch.eval_episodes,
+        "score": None if score is None else finite(score),
     }
 
 
@@ -131,9 +138,15 @@ def table(result: dict[str, Any]) -> Table:
     middle = "not known" if result["iqm"] is None else f"{result['iqm']:.3f}"
     drawn.caption = (
         f"interquartile mean of the {of}: {middle}, 95 % {interval}; last evaluation of each seed, "
-        f"{result['evaluation_episodes']} episodes"
+        f"{_episodes(result['evaluation_episodes'])}"
     )
     return drawn
+
+
+def _episodes(played: int | list[int]) -> str:
+    if isinstance(played, int):
+        return f"{played} episodes"
+    return f"{' or '.join(map(str, played))} episodes, as each was begun ({SUMMARY} has it of each)"
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -41,6 +41,8 @@ class Resume:
     """A config.json to run again."""
     out: Path | None = None
     """Where the repeated run goes; needed with --config."""
+    datasets_root: Path | None = None
+    """Folder of Minari datasets, where it is not the one that the run was begun with."""
 
 
 def train(config: FromDemonstrations) -> None:
@@ -68,7 +70,8 @@ def go_on(command: Resume) -> None:
             raise UserError("--config repeats a run in a new folder: name it with --out FOLDER")
         config = from_json(FromDemonstrations, files.read_json(command.config), str(command.config))
         check_module(config.env_id, str(command.config))
-        return train(replace(config, out=command.out))
+        root = command.datasets_root or config.datasets_root
+        return train(replace(config, out=command.out, datasets_root=root))
     assert command.resume is not None
     if command.out is not None:
         raise UserError(
@@ -82,7 +85,7 @@ def go_on(command: Resume) -> None:
             )
     config = from_json(FromDemonstrations, folder.config, str(folder.path / "config.json"))
     build.check_device(config.device)
-    demos = drawn_again(config, folder)
+    demos = drawn_again(config, folder, command.datasets_root)
     torch.set_num_threads(config.threads)
     return play(config, demos, folder)
 

@@ -183,6 +183,7 @@ class PPOLearner(Rollouts):
             seed=seed,
             device=device,
         )
+        _centre(self.model)
         # without one SB3 makes a folder for its own
         self.model.set_logger(Logger(folder=None, output_formats=[]))
         chosen = isinstance(self.model.action_space, Discrete)
@@ -281,6 +282,17 @@ class PPOLearner(Rollouts):
     def close(self) -> None:
         """Close the environments."""
         self.venv.close()
+
+
+def _centre(model: PPO) -> None:
+    """Begin at the middle of the box of actions, as SB3 does where that is 0.
+
+    From far outside, every action that is drawn would be clipped to one bound, and nothing learned from it.
+    """
+    if isinstance(box := model.action_space, Box):
+        bias = model.policy.action_net.bias
+        assert isinstance(bias, nn.Parameter)
+        bias.data += bias.new_tensor((box.low + box.high) / 2)
 
 
 def _actor_weights(model: PPO) -> dict[str, Tensor]:

@@ -25,6 +25,8 @@ from irl.core import files
 from irl.core.config import from_json
 from irl.core.errors import UserError
 from irl.core.nets import CLIP
+from irl.envs.names import split_name
+from irl.envs.tasks import task_of
 
 FORMAT, VERSION = "irl.policy", 1
 
@@ -185,7 +187,7 @@ def check_policy(policy: Policy, env: gym.Env) -> None:
     """Refuse a policy of another task than `env`'s.
 
     Raises:
-        UserError: its observations or actions are of other sizes.
+        UserError: its observations or actions are of other sizes; or both tasks are known and differ.
     """
     wanted = env.spec.id if env.spec is not None else type(env.unwrapped).__name__
     has = policy.spec.obs_dim, policy.spec.action_dim
@@ -194,6 +196,12 @@ def check_policy(policy: Policy, env: gym.Env) -> None:
         raise UserError(
             f"the policy of {policy.spec.env_id} takes observations of {has[0]} and gives actions of "
             f"{has[1]}; {wanted} has {needs[0]} and {needs[1]}: choose a policy of this task"
+        )
+    its = split_name(policy.spec.env_id)[0]
+    if its != wanted and task_of(its) is not None and task_of(wanted) is not None:
+        raise UserError(
+            f"the policy is of {its}, which is not {wanted}, though both have observations of {has[0]} and "
+            f"actions of {has[1]}: choose a policy of this task"
         )
 
 

@@ -62,6 +62,26 @@ def check_level(level: str) -> None:
         raise UserError(f"{level!r:.80} is not a level; expected letters, digits, _ and -, e.g. expert")
 
 
+def check_place(place: Path, env_id: str) -> None:
+    """Refuse the folder of another task's policy: tasks with one short name, as versions are, share one.
+
+    Raises:
+        UserError: the card there is of another task.
+    """
+    if not (place / CARD).is_file():
+        return
+    try:
+        there = read_card(place / CARD).env_id
+    except UserError:
+        # a damaged card says nothing, and training again is what mends it
+        return
+    if there != env_id:
+        raise UserError(
+            f"{place} holds the policy of {there}, and one of {env_id} would lie in the same folder; put it "
+            f"on another shelf with --policies-root FOLDER"
+        )
+
+
 def find(env_id: str, level: str = "expert", root: Path | None = None) -> Shelved:
     """The policy of a task.
 

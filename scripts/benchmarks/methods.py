@@ -9,10 +9,11 @@ again; one whose run folder is there goes on.
 """
 
 import json
+import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -25,6 +26,10 @@ from irl.policies import shelf
 
 RESULTS = Path(__file__).parent / "results"
 EPISODES = 25
+PLACES = ("--out", "--datasets-root", "--policies-root")
+"""Flags that say where things are; what is asked for is the same elsewhere."""
+PPO_ROUND = 2048
+"""Steps of PPO's rounds unless others are typed."""
 
 
 Method = Literal["gail", "gail-sac", "gail-td3", "dac", "dac-td3", "airl", "airl-sac"]
@@ -82,23 +87,43 @@ def begin_or_resume(command: str, run: Path, *words: str) -> None:
         irl(command, *words)
         return
     begun = json.loads((run / "environment.json").read_text())["command"]
-    if _no_places(shlex.split(begun)) != _no_places((command, *words)):
+    # the first word is the program
+    if _asked(shlex.split(begun)[1:]) != _asked((command, *words)):
         asked = shlex.join((command, *words))
         raise SystemExit(f"{run} was begun by `{begun}`, not by `{asked}`; choose another --runs")
     irl(command, "--resume", str(run))
 
 
-def _no_places(words: Sequence[str]) -> set[str]:
-    """What a command says but where things are."""
-    return {word for word in words if "/" not in word} - {"-c", "irl"}
+def _asked(words: Sequence[str]) -> list[str]:
+    """What a command says but where things are, in its order; of the run that it retrains on, the name."""
+    kept, rest = [], iter(words)
+    for word in rest:
+        if word in PLACES:
+            next(rest, None)
+        elif word.partition("=")[0] not in PLACES:
+            kept.append(word)
+    if kept[:1] == ["retrain"]:
+        kept[1:2] = [Path(run).name for run in kept[1:2]]
+    return kept
 
 
-def check_extra(file: Path, extra: str) -> None:
-    """Stop where a result that is there was made with other words."""
-    if (made := json.loads(file.read_text())["extra"]) != extra:
-        raise SystemExit(
-            f"{file} was made with --extra {made!r}, not {extra!r}; choose another --out and --runs"
-        )
+def check_settings(file: Path, **asked: Any) -> None:
+    """Stop where a result that is there was made by other settings; what it does not say is not compared."""
+    found = json.loads(file.read_text())
+    made = found | {"steps": _asked_steps(found, asked["steps"])}
+    if other := [f"--{k} {made[k]!r}, not {v!r}" for k, v in asked.items() if k in made and made[k] != v]:
+        raise SystemExit(f"{file} was made with {'; '.join(other)}; choose another --out and --runs")
+
+
+def _asked_steps(found: Mapping[str, Any], steps: int) -> int:
+    """The steps that a result was asked for: of one that does not say it, `steps` where they may be."""
+    if (said := found.get("steps", found.get("settings", {}).get("steps"))) is not None:
+        return said
+    # a run ends with a whole round
+    typed = re.findall(r"steps[-_]per[-_]round[= ](\d+)", found.get("extra", ""))
+    longest = int(typed[-1]) if typed else PPO_ROUND
+    played = found.get("env_steps", steps)
+    return steps if steps <= played < steps + longest else played
 
 
 def result(settings: Settings, task: str, seed: int, run: Path) -> dict[str, Any]:
@@ -138,7 +163,7 @@ def main(settings: Settings) -> None:
         for seed in settings.seeds:
             file = settings.out / settings.method / f"{task_name(task)}-s{seed}.json"
             if file.is_file():
-                check_extra(file, settings.extra)
+                check_settings(file, task=task, steps=settings.steps, extra=settings.extra)
                 print(f"{file} is there", flush=True)
                 continue
             row = cell(settings, task, seed)

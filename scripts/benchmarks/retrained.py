@@ -18,7 +18,7 @@ import tyro
 
 # beside this file
 from judged import HAND_WRITTEN, reward_name
-from methods import RESULTS, Method, begin_or_resume, check_extra
+from methods import RESULTS, Method, begin_or_resume, check_settings
 
 from irl.core.provenance import command_line
 from irl.core.records import open_run
@@ -69,6 +69,7 @@ def cell(settings: Settings, run: Path, snapshot: int, part: str | None, name: s
         "snapshot": snapshot,
         "part": part,
         "algo": settings.algo,
+        "steps": settings.steps,
         "env_steps": found["env_steps"],
         "seed": found["seed"],
         "score": found["true"]["normalised_score"],
@@ -94,7 +95,8 @@ def main(settings: Settings) -> None:
                     name = "-".join([task_name(task), f"s{seed}", str(snapshot), *([part] if part else [])])
                     file = settings.out / "retrained" / settings.method / f"{name}.json"
                     if file.is_file():
-                        check_extra(file, settings.extra)
+                        asked = {"steps": settings.steps, "extra": settings.extra}
+                        check_settings(file, algo=settings.algo, **asked)
                         print(f"{file} is there", flush=True)
                         continue
                     row = cell(settings, run, snapshot, part, name)

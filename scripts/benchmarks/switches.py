@@ -93,13 +93,17 @@ def cell(settings: Settings, method: str, task: str, switch: str) -> dict[str, A
     root = settings.runs / "datasets"
     methods.demonstrations(task, root)
     run = settings.runs / f"{method}-{task_name(task)}-{switch}"
-    steps, words = settings.steps or STEPS[method], cells(method)[switch]
-    extra = f"{words} {settings.extra}".strip()
+    steps, extra = _asked(settings, method, switch)
     asked = methods.Settings(method, (task,), (settings.seed,), steps, extra)  # pyright: ignore[reportArgumentType]
     given = ("--env-id", task, "--demo-episodes", "5", "--steps", str(steps), "--seed", str(settings.seed))
     methods.begin_or_resume("train", run, method, *given, "--datasets-root", str(root), *shlex.split(extra))
     methods.irl("evaluate", str(run))
     return {"switch": switch, **methods.result(asked, task, settings.seed, run)}
+
+
+def _asked(settings: Settings, method: str, switch: str) -> tuple[int, str]:
+    """Environment steps of a cell, and its words for `irl train`."""
+    return settings.steps or STEPS[method], f"{cells(method)[switch]} {settings.extra}".strip()
 
 
 def table(settings: Settings) -> str:
@@ -130,10 +134,8 @@ def main(settings: Settings) -> None:
     for method, task, switch in todo:
         file = settings.out / method / task_name(task) / f"{switch}.json"
         if file.is_file():
-            if (seed := json.loads(file.read_text())["seed"]) != settings.seed:
-                raise SystemExit(
-                    f"{file} is of seed {seed}; choose another --out and --runs for {settings.seed}"
-                )
+            steps, extra = _asked(settings, method, switch)
+            methods.check_settings(file, task=task, seed=settings.seed, steps=steps, extra=extra)
         else:
             row = cell(settings, method, task, switch)
             file.parent.mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,7 @@ import tyro
 
 # beside this file
 from judged import HAND_WRITTEN, reward_name
-from methods import RESULTS, check_extra, irl
+from methods import RESULTS, check_settings, irl
 
 from irl.core.provenance import command_line
 from irl.core.records import open_run
@@ -74,6 +74,7 @@ def cell(settings: Settings, run: Path, reward: str, config: dict[str, Any]) -> 
         "run": run.name,
         "task": config["env_id"],
         **{name: row[name] for name in KEPT},
+        "steps": settings.steps,
         "extra": settings.extra,
         "command": f"python scripts/benchmarks/{command_line()}",
         **{name: value for name, value in environment.items() if name != "command"},
@@ -109,11 +110,7 @@ def main(settings: Settings) -> None:
         name = "-".join((reward, whose, *settings.dynamics))
         file = settings.out / f"{name.replace('=', '-')}.json"
         if file.is_file():
-            check_extra(file, settings.extra)
-            if (seeds := json.loads(file.read_text())["seeds"]) != list(settings.seeds):
-                raise SystemExit(
-                    f"{file} is of seeds {seeds}, not {list(settings.seeds)}; choose another --out"
-                )
+            check_settings(file, seeds=[*settings.seeds], steps=settings.steps, extra=settings.extra)
         else:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(json.dumps(cell(settings, run, reward, config), indent=1) + "\n")

@@ -8,7 +8,8 @@ run is that of the first such evaluation at or above `share` of the way from ran
 run that does not get there within its steps is reported with the best that it reached. Starting up is not
 counted. The peer plays Hopper-v4, whose dynamics are those of v5.
 
-Goes on where it was stopped: a run that is in the results is not done again. Writes results/wallclock.json.
+Goes on where it was stopped: a run that is in the results is not done again. Writes results/wallclock.json,
+whose rows say by what settings, and where, each was made; rows of other settings are not added to.
 """
 
 import json
@@ -28,6 +29,8 @@ from irl.policies.shelf import expert_card
 RESULTS = HERE / "results" / "wallclock.json"
 EPISODES = 4
 """Demonstrations of both."""
+KEPT = ("share", "every", "episodes", "peer_steps")
+"""Settings that a row is made by, beside its task and seed."""
 
 
 @dataclass(frozen=True)
@@ -89,26 +92,39 @@ def run(name: str, seed: int, settings: Settings, root: Path) -> dict[str, Any]:
     }
 
 
-def result(settings: Settings, facts: dict[str, Any], rows: list[dict[str, Any]]) -> dict[str, Any]:
+def read_rows(settings: Settings) -> list[dict[str, Any]]:
+    """The rows of a file to go on with; none where there is none.
+
+    Raises:
+        SystemExit: one was made by other settings.
+    """
+    if not settings.out.exists():
+        return []
+    found = json.loads(settings.out.read_text())
+    # rows said nothing of themselves once: what the file said was of them all
+    whole = {name: value for name, value in found.items() if name not in ("rows", "times_shorter", "commit")}
+    rows = [{**row, **{k: v for k, v in whole.items() if k not in row}} for row in found["rows"]]
+    for row in rows:
+        asked = {name: getattr(settings, name) for name in KEPT if name in row}
+        if other := [f"--{k.replace('_', '-')} {row[k]}, not {v}" for k, v in asked.items() if row[k] != v]:
+            made = f"{row['name']} seed {row['seed']} in {settings.out} was made with"
+            raise SystemExit(f"{made} {'; '.join(other)}; choose another --out")
+    return rows
+
+
+def result(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Everything that is written: with the peer's median over ours where every run got there."""
     seconds = {name: [row["seconds"] for row in rows if row["name"] == name] for name in ("irl", "imitation")}
     both = all(times and None not in times for times in seconds.values())
     ratio = statistics.median(seconds["imitation"]) / statistics.median(seconds["irl"]) if both else None
-    shown = {"share": settings.share, "every": settings.every, "episodes": settings.episodes}
-    return {
-        "rows": rows,
-        "times_shorter": ratio,
-        **shown,
-        "commit": facts["git_commit"],
-        **facts,
-        "threads": 1,
-    }
+    return {"rows": rows, "times_shorter": ratio}
 
 
 def main(settings: Settings) -> None:
     """Do the runs that are not in the results yet, and write after each."""
     facts = environment(f"python scripts/benchmarks/{command_line()}")
-    rows = json.loads(settings.out.read_text())["rows"] if settings.out.exists() else []
+    made_by = {**{name: getattr(settings, name) for name in KEPT}, **facts, "threads": 1}
+    rows = read_rows(settings)
     done = {(row["name"], row["task"], row["seed"]) for row in rows}
     names = ("irl", "imitation") if settings.peer_python else ("irl",)
     for seed in settings.seeds:
@@ -116,10 +132,10 @@ def main(settings: Settings) -> None:
             if (name, settings.task, seed) in done:
                 continue
             with tempfile.TemporaryDirectory() as folder:
-                rows.append(run(name, seed, settings, Path(folder)))
+                rows.append({**run(name, seed, settings, Path(folder)), **made_by})
             settings.out.parent.mkdir(exist_ok=True)
-            settings.out.write_text(json.dumps(result(settings, facts, rows), indent=1) + "\n")
-    print(json.dumps({"times_shorter": result(settings, facts, rows)["times_shorter"]}))
+            settings.out.write_text(json.dumps(result(rows), indent=1) + "\n")
+    print(json.dumps({"times_shorter": result(rows)["times_shorter"]}))
 
 
 if __name__ == "__main__":

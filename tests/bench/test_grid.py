@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from irl.bench.cells import expand, only
+from irl.bench.cells import LATER, completed, expand, only
 from irl.bench.grid import SHIPPED, Given, find_grid, read_grid
+from irl.core.config import to_json
+from irl.core.differences import differences
 from irl.core.errors import UserError
 
 SMALL = """
@@ -55,6 +57,25 @@ def test_a_grid_is_the_product_of_its_parts_with_what_stands_at_the_top(tmp_path
     half = cells["dac-hopper-d5-s2-ppo-on-50"]
     assert (half.source, half.share, half.arm) == ("dac-hopper-d5-s2", 0.5, "ppo on dac at 50%")
     assert half.words == ("--algo", "ppo", "--steps", "500")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "complaint"),
+    [
+        ("steps = 1000", "steps = 2000", "source_steps was 1000 and is 2000"),
+        ('"learner.lr" = 1e-3', '"learner.lr" = 1e-4', "source_words was ['dac', "),
+    ],
+)
+def test_a_retraining_on_what_was_learned_otherwise_is_another_cell(
+    tmp_path: Path, before: str, after: str, complaint: str
+) -> None:
+    (was,) = only(expand(read_grid(write(tmp_path, SMALL))), ["on-50"])[1:]
+    (now,) = only(expand(read_grid(write(tmp_path, SMALL.replace(before, after)))), ["on-50"])[1:]
+    assert differences(to_json(was), to_json(now))[0].startswith(complaint)
+    older = {name: value for name, value in to_json(was).items() if name not in LATER}
+    assert completed(older, now) == to_json(now)
+    assert completed(to_json(was), now) == to_json(was)
+    assert completed([], now) == []
 
 
 def test_only_some_cells_bring_the_runs_that_they_need(tmp_path: Path) -> None:

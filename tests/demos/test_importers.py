@@ -228,6 +228,10 @@ WRONG: dict[str, tuple[Callable[[Arrays], Arrays], str]] = {
         lambda a: put("next_observations", (39, 0), 9.0)(put("observations", (40, 0), 9.0)(a)),
         "episode 1 has 9 in observations, column 0, at step 10; .* -1.5 to 1.5",
     ),
+    "nan for a flag": (
+        changed(terminals=np.full(90, np.nan)),
+        "nan in row 0 of terminated .*terminals.*; expected 0 or 1",
+    ),
     "nan": (put("rewards", (65,), np.nan), "episode 2 has nan in rewards at step 5"),
     "another next observation": (
         put("next_observations", (33, 1), 0.5),

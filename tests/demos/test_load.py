@@ -9,7 +9,7 @@ import pytest
 from irl.core.errors import UserError
 from irl.core.types import Episode, from_episodes
 from irl.demos.generate import generate
-from irl.demos.load import Demos, check_task, load_demos
+from irl.demos.load import Demos, check_task, load_demos, other_variant
 from irl.envs.make import make
 
 
@@ -110,8 +110,21 @@ def test_another_task_of_the_same_shapes():
     env.close()
 
 
+def test_another_version_of_a_task_is_said():
+    episode = Episode(np.zeros((2, 17)), np.zeros((1, 6)), np.zeros(1), terminated=False, truncated=True)
+    env = make("HalfCheetah-v5")
+    assert other_variant(_demos(episode, "HalfCheetah-v5"), env) is None
+    assert other_variant(_demos(episode, None), env) is None
+    line = other_variant(_demos(episode, "HalfCheetah-v4"), env)
+    assert line == (
+        "demonstrations x-v0 are of HalfCheetah-v4, training is in HalfCheetah-v5; where that is not meant, "
+        "name other demonstrations with --demos"
+    )
+    env.close()
+
+
 def _demos(episode: Episode, env_id: str | None) -> Demos:
-    return Demos((episode,), (), (0,), (), "x-v0", env_id, Path(), None, None)
+    return Demos((episode,), (), (0,), (), "x-v0", env_id, Path(), None, None, env_id)
 
 
 def test_actions_are_held_against_the_bounds_as_float32_stores_them():

@@ -1,5 +1,7 @@
 """An environment that does wrong is named with its step; one that does right is not changed."""
 
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -48,6 +50,18 @@ def test_a_second_episode_counts_its_steps_anew() -> None:
     for _ in range(2):
         with pytest.raises(UserError, match="after step 12"):
             rollout(env, still, seed=1)
+
+
+class ARow(gym.RewardWrapper):
+    """Pays a row of one number."""
+
+    def reward(self, reward: Any) -> Any:
+        return np.array([reward])
+
+
+def test_a_reward_that_is_a_row_is_refused_before_anything_is_made_of_it() -> None:
+    with pytest.raises(UserError, match=r"^Task-v0 gave a reward of shape \(1,\) after step 0 \(seed 7\)"):
+        rollout(Guarded(ARow(gym.make("PointMass-v0")), "Task-v0"), still, seed=7)
 
 
 def test_an_environment_that_does_right_is_as_it_was() -> None:

@@ -9,9 +9,12 @@ from xml.etree import ElementTree
 import pytest
 
 from irl.bench import worker
+from irl.bench.cells import LATER, expand, only
+from irl.bench.grid import read_grid
 from irl.bench.leash import PROGRAM
 from irl.bench.processes import Processes
 from irl.bench.written import marks
+from irl.core.config import to_json
 from irl.experiment.cli import main
 from tests.experiment.conftest import SETTINGS, TASK
 
@@ -149,6 +152,24 @@ def test_a_cell_goes_on_where_it_was_and_what_it_was_not_is_refused(
     with pytest.raises(SystemExit):
         bench(*one)
     assert "was begun as another cell: steps was 512 and is 640" in capsys.readouterr().err
+
+
+def test_a_retraining_on_what_was_learned_otherwise_has_no_result_yet(
+    bench: Command, commands: list, capsys: pytest.CaptureFixture
+) -> None:
+    (cell,) = only(expand(read_grid(Path("small.toml"))), ["ppo"])[1:]
+    Path("results/small").mkdir(parents=True)
+    result = Path("results/small") / f"{cell.name}.json"
+    # written before cells said how their sources learned
+    older = {name: value for name, value in to_json(cell).items() if name not in LATER}
+    result.write_text(json.dumps({"cell": older}))
+    bench("--estimate")
+    assert "4 cells to do, 1 done" in " ".join(capsys.readouterr().err.split())
+    result.write_text(json.dumps({"cell": to_json(cell)}))
+    Path("small.toml").write_text(GRID.replace("steps = 512", "steps = 640"))
+    with pytest.raises(SystemExit):
+        bench("--estimate")
+    assert "is the result of another cell: source_steps was 512 and is 640" in capsys.readouterr().err
 
 
 def test_an_evaluation_of_half_a_run_is_made_again(

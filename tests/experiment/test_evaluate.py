@@ -93,6 +93,23 @@ def test_a_task_that_pays_nan_is_evaluated_too(irl: Command) -> None:
     assert 0 <= found["reward"]["auroc"] <= 1
 
 
+def test_without_a_score_the_true_reason_is_given(irl: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ("--steps=2", "--demo-episodes=2", "--learner.hidden=8", "--watch.no-progress")
+    irl("train", "bc", "--env-id", "NoReward-v0", "--out", "run", *words)
+    for expert, random, said in (
+        (0.0, 0.0, "the expert's return and that of random actions are equal, so there is no scale"),
+        (0.0, None, "no expert or random return is known for this task"),
+        (None, 0.0, "no expert or random return is known for this task"),
+    ):
+        ends = {"expert": expert, "random": random, "demonstrations": None}
+        known = {who: None if mean is None else {"return_mean": mean} for who, mean in ends.items()}
+        monkeypatch.setattr("irl.experiment.evaluate.references_of", lambda *_, known=known: known)
+        irl("evaluate", "run", *LOOK)
+        policy = files.read_json(Path("run/evaluation.json"))["policy"]
+        assert policy["normalised_score"] is None
+        assert said in policy["normalised_score_reason"]
+
+
 def test_with_no_episode_held_out_it_says_so(train: Callable[..., Path], irl: Command) -> None:
     run = train("run", "--demo-episodes", "6")
     irl("evaluate", run, *LOOK)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import gymnasium as gym
 import pytest
 
 from irl.core import files
@@ -78,6 +79,24 @@ def test_what_is_on_the_shelf_is_not_replaced_unasked(irl: Command, capsys: pyte
     assert Path("shelf/cliff/expert/policy.safetensors").read_bytes() == first
     irl(*words, "--seed", "2", "--overwrite")
     assert Path("shelf/cliff/expert/policy.safetensors").read_bytes() != first
+
+
+@pytest.mark.parametrize("more", [(), ("--overwrite",)], ids=["", "overwrite"])
+def test_another_version_of_the_task_does_not_come_in_its_place(
+    irl: Command, capfd: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
+) -> None:
+    spec = replace(gym.spec("Cliff-v0"), id="Cliff-v1")
+    monkeypatch.setitem(gym.registry, "Cliff-v1", spec)
+    words = ("--policies-root", "shelf", "--watch.no-progress")
+    irl("experts", "train", "--env-id", "Cliff-v0", *words)
+    first = Path("shelf/cliff/expert/policy.safetensors").read_bytes()
+    with pytest.raises(SystemExit):
+        irl("experts", "train", "--env-id", "Cliff-v1", "--out", "other", *words, *more)
+    said = capfd.readouterr().err.splitlines()[-1]
+    assert "shelf/cliff/expert holds the policy of Cliff-v0, and one of Cliff-v1" in said
+    assert "--policies-root" in said
+    assert not Path("other").exists()
+    assert Path("shelf/cliff/expert/policy.safetensors").read_bytes() == first
 
 
 def test_the_same_command_again_goes_on_and_ends_the_same(irl: Command) -> None:

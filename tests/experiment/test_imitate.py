@@ -1,5 +1,6 @@
 """`irl.imitate`: ready-made models of SB3 learn from demonstrations, and DAC says why it takes none."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ import irl
 from irl.algorithms.adversarial import ScheduleConfig
 from irl.algorithms.interleaved import InterleavedConfig
 from irl.algorithms.loop import Round
-from irl.core.types import from_episodes
+from irl.core.types import Episode, from_episodes
+from irl.demos.load import Demos
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.gail import GAILConfig
 from irl.rewards.artefact import load_reward, save_reward
@@ -108,10 +110,29 @@ def test_gail_teaches_a_ready_made_ppo_the_task() -> None:
     assert (mean_return() - untrained) / (expert - untrained) > 0.8
 
 
+def test_demonstrations_that_no_policy_could_give_are_refused() -> None:
+    (episode,) = pointmass.demonstrations(1)
+    far = replace(episode, action=episode.action * 5)
+    with pytest.raises(ValueError, match=r"episode 1 .* has the action .* the model takes -1 to 1"):
+        irl.imitate(a_ppo(), [episode, far], steps=100)
+
+
+def test_demonstrations_of_another_known_task_of_the_same_shapes_are_refused() -> None:
+    still = Episode(np.zeros((3, 17)), np.zeros((2, 6)), np.zeros(2), terminated=False, truncated=True)
+    demos = Demos((still,), (), (0,), (), "x-v0", "Walker2d-v5", Path(), None, None)
+    model = PPO("MlpPolicy", "HalfCheetah-v5", n_steps=64, batch_size=32, device="cpu")
+    with pytest.raises(
+        ValueError, match="demonstrations are of Walker2d-v5, the model learns HalfCheetah-v5"
+    ):
+        irl.imitate(model, demos, steps=100)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"method": "dac"}, "indicator of the absorbing state.*use: irl train dac"),
+        ({"steps": 0}, "steps must be at least 1, not 0"),
+        ({"steps": -5}, "steps must be at least 1, not -5"),
         ({"method": "bc"}, "unknown method 'bc'; expected 'gail' or 'airl'"),
         ({"method": "airl", "discriminator": GAILConfig()}, "GAILConfig are no settings of airl"),
         ({"model": lambda: TD3("MlpPolicy", envs(n=1)), "method": "airl"}, "TD3's policy has one action for"),

@@ -2,8 +2,10 @@
 
 import json
 import os
+import re
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -18,8 +20,12 @@ from irl.bench.leash import PROGRAM
 from irl.bench.processes import Processes
 from irl.core.records import open_run
 from irl.core.types import Episode, from_episodes
+from irl.demos.curate import _write_part
+from irl.demos.generate import generate
 from irl.demos.load import load_demos
+from irl.demos.storage import open_dataset
 from irl.envs.inherited import VARIABLE
+from irl.envs.names import full_name
 from irl.envs.rollouts import rollouts
 from irl.experiment.cli import COMMANDS
 from irl.policies.policy import load_policy
@@ -217,7 +223,7 @@ def test_demonstrations_without_actions(inputs: str, irl: Command, capfd: pytest
     seen = (f"--discriminator.inputs={inputs}", "--schedule.expert-share=0.25", "--out=refused")
     with pytest.raises(SystemExit):
         # a learner of states and actions learns from them too
-        irl("train", "gail-sac", *words[2:8], "--demo-episodes=3", "--steps=100", *seen)
+        irl("train", "gail-sac", *words[2:8], "--demo-episodes=3", *seen)
     assert "(expert-share)" in capfd.readouterr().err
     irl(*words, "--demo-episodes=3", "--discriminator.inputs", inputs, "--out", "run")
     irl("evaluate", "run", *LOOK)
@@ -255,6 +261,42 @@ def parts(irl: Command, monkeypatch: pytest.MonkeyPatch) -> list[Episode]:
     return episodes
 
 
+class Mirrored(gym.ObservationWrapper):
+    """The point mass with its place in a dictionary, and beside it the place in a mirror."""
+
+    def __init__(self) -> None:
+        super().__init__(gym.make(TASK))
+        box = Box(-1.5, 1.5, (2,), np.float64)
+        self.observation_space = Dict({"place": box, "mirrored": box})
+
+    def observation(self, observation: np.ndarray) -> dict:
+        return {"place": observation, "mirrored": -observation}
+
+
+def test_demonstrations_of_other_parts_of_an_observation_are_refused(
+    irl: Command, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
+) -> None:
+    spec = EnvSpec("Mirrored-v0", lambda **_: Mirrored(), disable_env_checker=True)
+    monkeypatch.setitem(gym.registry, "Mirrored-v0", spec)
+    for part in ("place", "mirrored"):
+        words = {"dataset_id": f"{part}-v0", "root": "ds", "seeds": range(3), "description": ""}
+        task = full_name("Mirrored-v0", (f"obs_keys={part}",))
+        generate(
+            task, pointmass.expert(), algorithm="", author="", random_return=None, expert_return=None, **words
+        )
+    task = ("--env-id", "Mirrored-v0", "--env-kwargs")
+    irl("train", "gail", *task, "obs_keys=place", "--demos", "place-v0", *INTO_RUN)
+    assert "where that is not meant" not in capfd.readouterr().err
+    for words in (
+        ("train", "gail", *task, "obs_keys=mirrored", "--demos", "place-v0", *INTO_RUN[:-1], "--out=other"),
+        ("demos", "merge", "place-v0", "mirrored-v0", "--into", "both-v0", "--datasets-root", "ds"),
+    ):
+        with pytest.raises(SystemExit):
+            irl(*words)
+        assert re.search("other parts of the observations|of one task", capfd.readouterr().err)
+    assert not Path("other").exists()
+
+
 INTO_RUN = ("--datasets-root", "ds", "--demo-episodes=2", "--out", "run", *QUICK)
 
 
@@ -275,6 +317,10 @@ def test_parts_of_observations_in_a_dictionary_are_shown_split_and_merged(
     assert "3 of 30 to 30 steps" in capfd.readouterr().out
     irl("demos", "split", "parts-v0", "--into", "a-v0", "b-v0", *keys)
     irl("demos", "merge", "parts-v0", "again-v0", "--into", "c-v0", *keys)
+    # what is in a row now says of which parts, so that it is not taken for others
+    named = replace(open_dataset("parts-v0", "ds", ("place",)), env_spec='{"id": "InParts-v0"}')
+    _write_part(named, parts, "e-v0", Path("ds/e-v0").resolve(), "ds", "")
+    assert open_dataset("e-v0", "ds").env_name == 'InParts-v0?{"obs_keys":["place"]}'
     # in a row from then on
     assert [len(load_demos(name, root="ds")) for name in ("a-v0", "b-v0", "c-v0")] == [2, 1, 6]
     for found, made in zip(load_demos("c-v0", root="ds"), parts * 2, strict=True):

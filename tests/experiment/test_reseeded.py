@@ -11,8 +11,9 @@ import pytest
 from irl.core import files
 from irl.core.errors import UserError
 from irl.core.statistics import iqm
+from irl.experiment import reseeded
 from irl.experiment.configs import GAILRun
-from irl.experiment.retrain import Retrain, settled
+from irl.experiment.retrain import Retrain, retrain_one, settled
 from tests.experiment.conftest import TASK
 from tests.experiment.test_retrain import PPO, equal, policies, runs, trained
 
@@ -53,6 +54,23 @@ def test_seeds_are_gathered_and_later_ones_are_added(irl: Command, capsys: pytes
     assert row["seeds"] == [7, 8, 9]
     done = Path("again/retrain-gail-768-ppo-s8/retrain.json")
     assert done.stat().st_mtime_ns == before[done]
+
+
+@pytest.mark.usefixtures("runs")
+def test_a_row_that_another_command_wrote_meanwhile_stays(
+    irl: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    irl("retrain", "gail", "--seeds", "7", "--out", "again", *SHORT)
+    content = files.read_json(Path("gail/retrained.json"))
+    other = content["rows"][0] | {"part": "another", "seeds": [3]}
+
+    def meanwhile(command: Retrain) -> None:
+        retrain_one(command)
+        files.write_json(Path("gail/retrained.json"), content | {"rows": [*content["rows"], other]})
+
+    monkeypatch.setattr(reseeded, "retrain_one", meanwhile)
+    irl("retrain", "gail", "--seeds", "8", "--out", "again", *SHORT)
+    assert [(row["part"], row["seeds"]) for row in rows()] == [("another", [3]), ("gail", [7, 8])]
 
 
 @pytest.mark.usefixtures("runs")

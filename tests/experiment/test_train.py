@@ -1,6 +1,7 @@
 """`irl train` end to end on a small task: the run folder, resuming, and that watching changes nothing."""
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,9 +11,11 @@ import torch
 
 from irl.core import files
 from irl.core.records import open_run
+from irl.demos.generate import generate
 from irl.experiment import play
 from irl.policies.policy import load_policy
 from irl.rewards.artefact import load_reward
+from tests import pointmass
 from tests.experiment.conftest import DATASET, QUICK, TASK
 
 Train = Callable[..., Path]
@@ -86,6 +89,45 @@ def test_the_demonstrations_a_run_was_begun_with_are_the_ones_it_goes_on_with(
         with pytest.raises(SystemExit):
             irl(*words)
         assert "begun with" in capfd.readouterr().err.splitlines()[-1]
+
+
+def test_other_demonstrations_of_the_same_returns_are_not_the_ones_it_was_begun_with(
+    irl: Command, capfd: pytest.CaptureFixture
+) -> None:
+    irl("train", "gail", "--env-id", "NoReward-v0", "--out", "run", *QUICK)
+    words = {"algorithm": "", "author": "", "random_return": None, "expert_return": None, "description": ""}
+    name = "irl/noreward/expert-v0"
+    for root, seeds in (("same", range(6)), ("others", range(9, 15))):
+        generate("NoReward-v0", pointmass.expert(), dataset_id=name, root=root, seeds=seeds, **words)
+    irl("train", "--resume", "run", "--datasets-root", "same")
+    with pytest.raises(SystemExit):
+        irl("train", "--resume", "run", "--datasets-root", "others")
+    assert "begun with" in capfd.readouterr().err.splitlines()[-1]
+    record = Path("run/demonstrations.json")
+    older = {key: value for key, value in files.read_json(record).items() if key != "sha256"}
+    files.write_json(record, older)
+    irl("train", "--resume", "run", "--datasets-root", "others")
+
+
+def test_a_run_goes_on_from_another_folder_with_the_datasets_it_was_begun_with(
+    train: Train, irl: Command, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(home / "datasets", "mine")
+    train("run", "--datasets-root", "mine")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "nowhere")
+    Path("sub").mkdir()
+    monkeypatch.chdir("sub")
+    irl("train", "--resume", "../run")
+
+
+def test_a_rate_that_keeps_no_step_is_one_line_and_leaves_nothing(
+    train: Train, capfd: pytest.CaptureFixture
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        train("run", "--demo-rate=100000")
+    assert ended.value.code == 2
+    assert "no step of 4 episodes was kept at rate 100000: the longest has 30" in capfd.readouterr().err
+    assert not Path("run").exists()
 
 
 def test_a_torn_last_checkpoint_is_said_and_the_run_ends_the_same(

@@ -83,7 +83,10 @@ def test_evaluate_measures_the_policy_and_says_that_there_is_no_reward(
     found = files.read_json(run / "evaluation.json")
     assert found["policy"]["episodes"] == 2
     assert "learns no reward" in found["reward"]["notes"][0]
-    assert "learns no reward" in " ".join(capsys.readouterr().out.split())
+    assert "learns no reward" in found["distances_reason"]
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "learns no reward" in printed
+    assert "nor a reason" not in printed
     assert (run / "report.html").is_file()
     with pytest.raises(SystemExit):
         irl("retrain", run)

@@ -47,6 +47,14 @@ def weights(of: PPOLearner) -> dict[str, Tensor]:
     return {name: value.clone() for name, value in of.model.policy.state_dict().items()}
 
 
+def test_actions_begin_in_the_middle_of_their_box() -> None:
+    obs = np.random.default_rng(0).uniform(-1, 1, (50, 2))
+    assert not weights(learner())["action_net.bias"].any()
+    drawn = learner("Far-v0").policy()
+    actions = np.stack([drawn(row) for row in obs])
+    assert ((actions > 14.5) & (actions < 15.5)).all()
+
+
 def test_the_value_behind_a_time_limit_is_added_on_the_learned_reward() -> None:
     ours = learner()
     batch = ours.collect()

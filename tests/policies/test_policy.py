@@ -16,8 +16,17 @@ from irl.core.errors import UserError
 from irl.core.nets import NO_CLIP
 from irl.core.rng import stream
 from irl.core.types import ActFn
+from irl.envs.make import make
 from irl.learners.ppo import PPOConfig, PPOLearner
-from irl.policies.policy import FORMAT, VERSION, Policy, PolicySpec, load_policy, save_policy
+from irl.policies.policy import (
+    FORMAT,
+    VERSION,
+    Policy,
+    PolicySpec,
+    check_policy,
+    load_policy,
+    save_policy,
+)
 from irl.rewards.mujoco import HandWritten
 
 LOW, HIGH = np.array([-0.5, -2.0]), np.array([0.5, 1.0])
@@ -354,3 +363,18 @@ def test_an_exported_ppo_acts_as_sb3_does(hidden: tuple[int, ...]) -> None:
         np.testing.assert_array_equal(policy(obs[0].astype(np.float32)), first)
     finally:
         learner.close()
+
+
+def test_a_policy_of_another_known_task_of_the_same_sizes_is_refused() -> None:
+    env = make("HalfCheetah-v5")
+    for env_id, refused in (("Walker2d-v5", True), ("HalfCheetah-v5", False), ("MyCheetah-v0", False)):
+        weights = {"obs_mean": np.zeros(17), "obs_std": np.ones(17), "log_std": np.zeros(6)}
+        weights |= {"action_low": -np.ones(6), "action_high": np.ones(6)}
+        weights |= {"layers.0.weight": np.zeros((6, 17)), "layers.0.bias": np.zeros(6)}
+        policy = Policy(PolicySpec(env_id, 17, 6, (), "tanh", "gaussian"), weights)
+        if refused:
+            with pytest.raises(UserError, match="is of Walker2d-v5, which is not HalfCheetah-v5"):
+                check_policy(policy, env)
+        else:
+            check_policy(policy, env)
+    env.close()

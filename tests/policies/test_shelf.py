@@ -157,6 +157,21 @@ def test_the_policy_of_another_version_of_the_task_is_not_taken(nowhere: Path) -
         shelf.find("PointMass-v1", root=nowhere / "shelf")
 
 
+def test_a_place_is_one_tasks(nowhere: Path) -> None:
+    shelf.check_place(nowhere / "shelf" / "pointmass" / "expert", "PointMass-v1")
+    folder = put(nowhere / "shelf")
+    shelf.check_place(folder, "PointMass-v0")
+    with pytest.raises(UserError) as caught:
+        shelf.check_place(folder, "PointMass-v1")
+    assert str(caught.value) == (
+        f"{folder} holds the policy of PointMass-v0, and one of PointMass-v1 would lie in the same folder; "
+        f"put it on another shelf with --policies-root FOLDER"
+    )
+    # training again is what mends it
+    (folder / shelf.CARD).write_text("{")
+    shelf.check_place(folder, "PointMass-v1")
+
+
 def flip_last_bit(path: Path) -> None:
     content = path.read_bytes()
     path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
