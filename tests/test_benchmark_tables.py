@@ -3,6 +3,7 @@
 import json
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,6 +26,86 @@ def test_findings_have_every_judged_reward() -> None:
     made = truth.table(truth.Settings()).splitlines()
     assert len(made) > 15
     assert [line for line in made if line not in lines("FINDINGS.md")] == []
+
+
+def a_reward(
+    seed: int = 1, probe: str = "aa", steps: int = 20_000, **weights: dict[str, Any]
+) -> dict[str, Any]:
+    """The JSON of a judged reward, as far as the tables read it."""
+    between = {name: {"value": 0.9} for name in ("spearman", "kendall", "regret")}
+    return {
+        "method": "airl",
+        "reward": "airl",
+        "task": "Hopper-v5",
+        "seed": seed,
+        "env_steps": 9,
+        "score": 0.99,
+        "distances": {"headline": {"value": 0.36}, "probe_sha256": probe, "gamma": 0.99, "steps": steps},
+        "terms": {"weights": weights, "survival_bonus": 1.0, "explained": 0.62},
+        "cross_play": between,
+        "kendall": [0.5, 0.9],
+        "drift": {"snapshots": [0, 9], "to_truth": [0.5, 0.36]},
+        "verdicts": {"stable": True},
+    }
+
+
+def weight(value: float, low: float, high: float, why_not: str | None = None) -> dict[str, Any]:
+    return {"weight": value, "low": low, "high": high, "share": 0.3, "why_not": why_not}
+
+
+def cells(line: str) -> list[str]:
+    return line.strip("| ").split(" | ")
+
+
+@pytest.mark.parametrize(
+    ("forward", "ctrl", "shown"),
+    [
+        (weight(0.5, 0.4, 0.6), weight(2.0, 1.0, 3.0), ["0.30, 0.30", "4.00", "2.00"]),
+        (weight(0.5, -0.1, 1.1), weight(2.0, 1.0, 3.0), ["0.30 (?), 0.30", "–", "–"]),
+        (weight(0.5, 0.4, 0.6), weight(-2.0, -3.0, -1.0, "small"), ["0.30, 0.30 (-)", "–", "2.00"]),
+        (weight(-0.5, -0.6, -0.4), weight(2.0, 1.0, 3.0), ["0.30 (-), 0.30", "4.00", "2.00"]),
+        (weight(0.5, 0.4, 0.6, "small"), weight(2.0, 1.0, 3.0), ["0.30, 0.30", "–", "–"]),
+    ],
+)
+def test_control_and_the_bonus_are_to_a_forward_that_weighs_something(
+    forward: dict[str, Any], ctrl: dict[str, Any], shown: list[str]
+) -> None:
+    truth = import_module("truth")
+
+    line = dict(zip(truth.HEAD, cells(truth.line(a_reward(forward=forward, ctrl=ctrl), [], {})), strict=True))
+    columns = ("shares of forward, ctrl", "ctrl to forward", "bonus to forward")
+    assert [line[name] for name in columns] == shown
+
+
+def test_a_reward_judged_on_another_probe_has_no_numbers_beside_the_others(tmp_path: Path) -> None:
+    truth, judged = import_module("truth"), import_module("judged")
+
+    (tmp_path / "rewards").mkdir()
+    forward, ctrl = weight(0.5, 0.4, 0.6), weight(2.0, 1.0, 3.0)
+    for seed, probe, steps in ((1, "bb" * 32, 3080), (2, "aa", 20_000), (3, "aa", 20_000)):
+        found = a_reward(seed, probe, steps, forward=forward, ctrl=ctrl)
+        (tmp_path / "rewards" / f"{seed}.json").write_text(json.dumps(found))
+    reason = "on another probe: bbbbbbbb, 3,080 steps, gamma 0.99"
+    other, first, second = map(cells, truth.table(truth.Settings(results=tmp_path)).splitlines()[2:])
+    assert other == ["airl", "Hopper", "1", "0.990", *"–––––––––", reason]
+    assert first[4:] == second[4:] == ["0.36", "0.30, 0.30", "4.00", "2.00", "0.62", "0.90", *"–––", "stable"]
+    made = judged.tables(tmp_path / "rewards")
+    other, first, second = map(cells, made.splitlines()[2:5])
+    assert other == ["airl", "Hopper", "1", "0.990", *"–––––––", reason]
+    assert first[4:] == second[4:]
+    assert "| airl | Hopper | 1 | VAL |" not in made
+    assert "| airl | Hopper | 2 | VAL | 0.36 |" in made
+
+
+def test_the_usual_probe_is_that_of_most_and_of_two_as_frequent_the_larger() -> None:
+    judged = import_module("judged")
+
+    small, large = a_reward(probe="bb", steps=3080), a_reward(probe="aa")
+    assert judged.usual([small, large]) == judged.usual([large, small]) == {("Hopper-v5", "aa", 0.99)}
+    assert judged.usual([small, small, large]) == {("Hopper-v5", "bb", 0.99)}
+    other = large | {"distances": large["distances"] | {"gamma": 0.98}}
+    assert judged.alone(other, judged.usual([large, large, other])) is not None
+    assert judged.alone(large, judged.usual([large, large, other])) is None
 
 
 def test_switches_have_every_score() -> None:

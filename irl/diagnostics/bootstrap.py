@@ -18,9 +18,14 @@ LEVEL = 0.95
 
 def counts(layout: Layout, draws: int, rng: np.random.Generator) -> Int[np.ndarray, "D E"]:
     """How often each episode was drawn, in each of `draws` resamples."""
-    drawn = np.empty((draws, len(layout.stratum)), dtype=np.int64)
-    for stratum in range(len(layout.names)):
-        there = np.flatnonzero(layout.stratum == stratum)
+    return within(layout.stratum, draws, rng)
+
+
+def within(stratum: Int[np.ndarray, "E"], draws: int, rng: np.random.Generator) -> Int[np.ndarray, "D E"]:
+    """The same of episodes by the number of each one's stratum."""
+    drawn = np.empty((draws, len(stratum)), dtype=np.int64)
+    for one in np.unique(stratum):
+        there = np.flatnonzero(stratum == one)
         drawn[:, there] = rng.multinomial(len(there), np.full(len(there), 1.0 / len(there)), size=draws)
     return drawn
 

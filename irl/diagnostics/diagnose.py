@@ -45,8 +45,6 @@ class Diagnosis:
     """VAL over 50 steps, or the longest segment below that the episodes have room for."""
     curve: tuple[Distance, ...]
     """VAL over segments of 1, 10, 50, 100 steps and whole episodes."""
-    uncentred: float | None
-    """The headline with an offset counted; None where no episode ends early, where it means nothing."""
     references: tuple[Distance, ...]
     """The distances that were asked for by name."""
     strata: Mapping[str, Stratum]
@@ -107,11 +105,9 @@ def diagnose(
         else references.of_steps(name, of, seed)[0]
         for name in named
     )
-    ends = bool(steps.layout.terminated.any())
     return Diagnosis(
         headline=headline,
         curve=curve,
-        uncentred=val.uncentred(left, n)[0] if ends else None,
         references=found,
         strata={name: within(left, name, n, seed) for name in steps.layout.names},
         steps=len(steps.batch),

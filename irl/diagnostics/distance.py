@@ -80,14 +80,6 @@ def pearson_distance(a: Float[np.ndarray, "M"], b: Float[np.ndarray, "M"]) -> fl
     return float(np.linalg.norm(_unit(a) - _unit(b))) / 2.0
 
 
-def cosine_distance(a: Float[np.ndarray, "M"], b: Float[np.ndarray, "M"]) -> float:
-    """The same without centring, for tasks that end early, where an offset is a bonus for staying alive."""
-    sizes = [float(np.linalg.norm(column)) for column in (a, b)]
-    if not all(math.isfinite(size) and size > 0 for size in sizes):
-        return NAN
-    return float(np.linalg.norm(np.asarray(a) / sizes[0] - np.asarray(b) / sizes[1])) / 2.0
-
-
 def pearson_distances(columns: Float[np.ndarray, "M R"]) -> Float[np.ndarray, "R R"]:
     """All pairs of columns; NaN beside a constant one. 1 - rho loses digits below about 1e-7."""
     units = np.stack([_unit(column) for column in columns.T], axis=1) if columns.size else columns

@@ -30,8 +30,9 @@ class Health:
     bce: float
     """-(E_expert[log D] + E_policy[log(1 - D)]) / 2, nats; log 2 is blind."""
     jsd_bound: float
-    """log 2 - bce, nats: the Jensen-Shannon divergence of expert and policy is at least this. At 0 the policy
-    has converged, or the discriminator is blind; below 0 it is worse than blind."""
+    """log 2 - bce, nats: the Jensen-Shannon divergence of expert and policy is at least this, by steps that
+    were not learned from; by those that were it is no bound. At 0 the policy has converged, or the
+    discriminator is blind; below 0 it is worse than blind."""
     entropy: float
     """Of D, nats, both classes at half the weight; log 2 is unsure everywhere."""
     ece: float

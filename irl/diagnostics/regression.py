@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 Matrix = Float[np.ndarray, "P P"]
 
@@ -75,12 +75,9 @@ def redrawn(
     columns: Sequence[int],
     penalised: Sequence[int],
     ridge: float,
-    redraws: int,
-    rng: np.random.Generator,
+    counts: Int[np.ndarray, "R E"],
 ) -> Float[np.ndarray, "R Q"]:
-    """The fit to as many episodes drawn with replacement, each time."""
-    n = len(of_episodes)
-    counts = rng.multinomial(n, np.full(n, 1.0 / n), size=redraws)
+    """The fit to each of R resamples, by how often each episode is in it (`bootstrap.within`)."""
     drawn = np.tensordot(counts.astype(np.float64), of_episodes, 1)
     return np.stack([solve(gram, columns, penalised, ridge) for gram in drawn])
 

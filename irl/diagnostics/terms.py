@@ -5,7 +5,7 @@
 Fitted jointly: a potential that the learned reward is shaped by is taken off first, or it would be booked on
 the terms (Ng, Harada & Russell 1999: shaping changes no optimal policy). phi is the observations and their
 squares; ridge on theta alone; every share is of episodes that the fit has not seen, and every interval is of
-episodes drawn again, since the steps of one are alike.
+episodes drawn again within their stratum, since the steps of one are alike (bootstrap).
 
 What cannot be known is said. A learned reward's scale means nothing: read weights beside each other. The
 offset c and a term that pays for being alive are one quantity wherever an episode can end, because a constant
@@ -17,10 +17,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from irl.core.statistics import is_constant
 from irl.core.types import Episode
+from irl.diagnostics import bootstrap
 from irl.diagnostics.regression import condition, grams, redrawn, shapley, solve, unexplained
 from irl.diagnostics.shaping import alive_value, column_of, design, moments
 
@@ -40,7 +41,7 @@ class Weight:
     """In units of the learned reward for a unit of the term."""
     low: float
     high: float
-    """Where 95 % of redrawn sets of episodes put it."""
+    """Where 95 % of sets of episodes put it, drawn again within their strata."""
     standardised: float
     """Weight times the term's deviation over the learned reward's: what it moves."""
     share: float
@@ -73,6 +74,7 @@ def attribute(
     episodes: Sequence[Episode],
     learned: Sequence[Float[np.ndarray, "_"]],
     *,
+    stratum: Int[np.ndarray, "_"],
     gamma: float,
     rng: np.random.Generator,
     ridge: float = 1e-3,
@@ -80,31 +82,31 @@ def attribute(
 ) -> Attribution:
     """Weights of the terms that every episode has recorded, in the reward `learned` of their steps.
 
-    Cost: 2^(terms + 1) times 5 small fits, and one for each of `redraws`.
-
+    Args:
+        stratum: of each episode the number of its kind of play; one number where there is one kind.
     Raises:
-        ValueError: there are fewer than two episodes, they have no terms in common, or the learned reward is
-            of other steps or not finite.
+        ValueError: there are fewer than two episodes, they have no terms in common, the learned reward is of
+            other steps or not finite, or the strata are not one an episode.
+    Cost: 2^(terms + 1) times 5 small fits, and one for each of `redraws`.
     """
+    if len(stratum) != len(episodes):
+        raise ValueError(f"expected the stratum of each episode: {len(stratum)} != {len(episodes)}")
     names = names_of(episodes, learned)
-    constant = [name for name in names if _is_constant(episodes, name)]
-    varying = [name for name in names if name not in constant]
+    varying = [name for name in names if not is_constant(column_of(episodes, name))]
     mean, std = moments(episodes)
     of_episodes = grams([design(e, varying, gamma, mean, std) for e in episodes], learned)
     whole, k = of_episodes.sum(0), len(varying)
     potential, every = range(1 + k, len(whole) - 1), range(len(whole) - 1)
     shares, explained = shapley(of_episodes, k, potential, ridge)
     fitted = solve(whole, every, potential, ridge)
-    drawn = redrawn(of_episodes, every, potential, ridge, redraws, rng)
+    drawn = redrawn(of_episodes, every, potential, ridge, bootstrap.within(stratum, redraws, rng))
     fit = _Fit(episodes, learned, whole, fitted, drawn, shares)
     found = {name: _weight(fit, name, 1 + i) for i, name in enumerate(varying)}
-    found |= {name: _never(episodes, name) for name in constant}
-    ends = any(episode.terminated for episode in episodes)
     return Attribution(
-        terms={name: found[name] for name in names},
+        terms={name: found.get(name) or _never(episodes, name) for name in names},
         explained=explained,
         shaping=float(shares[-1]),
-        survival_bonus=_survival(fit, varying, gamma) if ends else math.nan,
+        survival_bonus=_survival(fit, varying, gamma),
         condition=condition(whole, k, potential),
         episodes=len(episodes),
     )
@@ -146,10 +148,6 @@ def names_of(episodes: Sequence[Episode], learned: Sequence[np.ndarray]) -> list
     return names
 
 
-def _is_constant(episodes: Sequence[Episode], name: str) -> bool:
-    return is_constant(column_of(episodes, name))
-
-
 def _weight(of: "_Fit", name: str, column: int) -> Weight:
     values = column_of(of.episodes, name)
     others = [i for i in range(of.whole.shape[0] - 1) if i != column]
@@ -186,6 +184,8 @@ def _never(episodes: Sequence[Episode], name: str) -> Weight:
 
 
 def _survival(of: "_Fit", names: Sequence[str], gamma: float) -> float:
+    if not any(episode.terminated for episode in of.episodes):
+        return math.nan
     bonus = gamma * float(of.fitted[0])
     for i, name in enumerate(names):
         if (value := alive_value(of.episodes, name)) is not None:

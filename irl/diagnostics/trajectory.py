@@ -29,7 +29,8 @@ class Trajectory:
     """Distance from the snapshot before; S - 1 numbers."""
     to_final: tuple[float, ...]
     cycling: float
-    """NaN where the first and the last are one: a reward that stood still does not cycle."""
+    """NaN where the first and the last are one, for a reward that stood still does not cycle, and where a
+    snapshot between has no distance."""
     map: Float[np.ndarray, "S 2"]
     """Places in a plane whose distances are nearest to those of `matrix` (classical scaling)."""
     flips: tuple[float, ...]
@@ -69,7 +70,8 @@ def trajectory(
 
 def cycling(speed: list[float], net: float) -> float:
     """Path length over net displacement; NaN where it came back to where it was or a part is unknown."""
-    walked = math.fsum(s for s in speed if math.isfinite(s))
+    # NaN where a speed is: a way with a gap in it may have been of any length
+    walked = math.fsum(speed)
     # below this, two distances are one rounding apart
     return walked / net if math.isfinite(net) and net > 1e-7 else NAN
 

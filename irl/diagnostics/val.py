@@ -21,7 +21,7 @@ from jaxtyping import Float
 
 from irl.core.rng import stream
 from irl.diagnostics.compare import Columns, compare
-from irl.diagnostics.distance import Distance, cosine_distance
+from irl.diagnostics.distance import Distance
 from irl.diagnostics.features import fitted
 from irl.diagnostics.segments import WHOLE, segments
 from irl.diagnostics.stack import Layout
@@ -66,10 +66,3 @@ def longest(layout: Layout, ns: Sequence[int] = CURVE) -> int:
 
 def _room(layout: Layout, n: int) -> float:
     return float(np.mean(layout.terminated | (layout.length >= n)))
-
-
-def uncentred(of: Canonical, n: int) -> list[float]:
-    """The cosine distance of each reward to the reference: an offset counts where episodes end early."""
-    c = of.columns
-    values = segments(of.errors, c.steps.layout, c.gamma, n).values
-    return [cosine_distance(values[:, 0], values[:, i]) for i in range(1, 1 + c.asked)]

@@ -23,7 +23,7 @@ def judge_terms(reward: Given, base: ProbeSet, gamma: float, seed: int) -> dict[
     learned = np.split(read(reward, steps.batch), steps.layout.start[1:])
     rng = stream(seed, "terms")
     try:
-        found = attribute(episodes, learned, gamma=gamma, rng=rng)
+        found = attribute(episodes, learned, stratum=steps.layout.stratum, gamma=gamma, rng=rng)
     except ValueError as error:
         return {"reason": str(error)}
     return as_json(found) | {"reason": None}

@@ -53,7 +53,6 @@ def judge_distances(
         "episodes": found.episodes,
         "headline": as_json(found.headline),
         "curve": [as_json(d) for d in found.curve],
-        "uncentred": None if found.uncentred is None else finite(found.uncentred),
         "references": [as_json(d) for d in others],
         "strata": {name: _stratum(s) for name, s in strata.items()},
         "notes": notes,

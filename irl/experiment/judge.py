@@ -27,6 +27,7 @@ def judge_reward(reward: LearnedReward, probe: Probe, seed: int) -> dict[str, An
     """Agreement with the hand-written reward, separation of expert and policy, means by stratum.
 
     Over all strata a correlation is mostly their order, which is easy; within one it is the reward's detail.
+    `auroc` is of the logit (of AIRL: f), whatever the reward pays.
     """
     hand_written = HandWritten()
     learned = {name: read(reward, probe.steps[name]) for name in STRATA}
@@ -84,7 +85,7 @@ def judge_drift(rewards: Mapping[int, LearnedReward], probe: Probe) -> dict[str,
         },
         "changes": changes,
         "notes": [
-            "The reward before the learner's scaling; AUROC is of the final policy against the expert."
+            "The reward before the learner's scaling; AUROC is by it, of the final policy against the expert."
         ],
     }
 

@@ -107,11 +107,12 @@ def _terms(
     found: list[Mapping[str, Any]] = []
     for i in chosen:
         learned = np.split(rewards[:, i], steps.layout.start[1:])
-        rng = stream(seed, "terms")
+        rng, kind = stream(seed, "terms"), steps.layout.stratum
         try:
-            found.append(as_json(attribute(episodes, learned, gamma=gamma, rng=rng, redraws=REDRAWS)))
+            weighed = attribute(episodes, learned, stratum=kind, gamma=gamma, rng=rng, redraws=REDRAWS)
         except ValueError as error:
             return {"reason": str(error)}
+        found.append(as_json(weighed))
     spread = {
         name: float(np.std(np.concatenate([e.terms[name] for e in episodes]))) for name in found[0]["weights"]
     }

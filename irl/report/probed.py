@@ -40,9 +40,15 @@ def drift_table(evaluation: Mapping[str, Any]) -> Table | None:
 
 
 def health_table(evaluation: Mapping[str, Any]) -> Table | None:
-    """How well the discriminator tells, a row a snapshot; None where that was not measured."""
-    columns = ("step", "AUROC", "by heart", "JSD ≥", "ECE", "slope")
-    return _by_snapshot(evaluation, "the discriminator", columns, _health)
+    """How well the discriminator tells, a row a snapshot; None where that was not measured.
+
+    Of the demonstrations that it learned from where none is held out: those bound no divergence.
+    """
+    if _held_out(evaluation):
+        columns = ("step", "AUROC", "by heart", "JSD ≥", "ECE", "slope")
+        return _by_snapshot(evaluation, "the discriminator", columns, _health)
+    title, columns = "the discriminator, on training demonstrations", ("step", "AUROC", "ECE", "slope")
+    return _by_snapshot(evaluation, title, columns, _health_in_training)
 
 
 def _by_snapshot(
@@ -74,9 +80,9 @@ DRIFT = (
     "share of fresh policy steps that lie where the probe has none, of which nothing here speaks."
 )
 HEALTH = (
-    "AUROC: held-out expert against fresh policy steps, 0.5 is blind; by heart: what training demonstrations "
-    "have over held-out ones; JSD: nats, at least; ECE: how far D is from a probability; slope: 99th "
-    "percentile of the logit's gradient."
+    "AUROC: held-out expert, or training demonstrations where the title says so, against fresh policy steps, "
+    "0.5 is blind; by heart: what training demonstrations have over held-out ones; JSD: nats, at least; ECE: "
+    "how far D is from a probability; slope: 99th percentile of the logit's gradient."
 )
 
 
@@ -92,17 +98,23 @@ def _moved(evaluation: Mapping[str, Any], i: int) -> list[Text]:
     return [_to_truth(_item(drift, "to_truth", i)), *(_text(value, digits) for value, digits in values)]
 
 
+def _held_out(evaluation: Mapping[str, Any]) -> bool:
+    rows = lookup(evaluation, "drift.health")
+    return isinstance(rows, list) and any(lookup(row, "held_out") is not None for row in rows)
+
+
 def _health(evaluation: Mapping[str, Any], i: int) -> list[Text]:
+    keys = ("held_out.auroc", "memorised", "held_out.jsd_bound", "held_out.ece")
+    return _of_health(evaluation, i, keys)
+
+
+def _health_in_training(evaluation: Mapping[str, Any], i: int) -> list[Text]:
+    return _of_health(evaluation, i, ("train.auroc", "train.ece"))
+
+
+def _of_health(evaluation: Mapping[str, Any], i: int, keys: Sequence[str]) -> list[Text]:
     health = _item(lookup(evaluation, "drift"), "health", i)
-    side = "held_out" if lookup(health, "held_out") is not None else "train"
-    values = [
-        (lookup(health, f"{side}.auroc"), 2),
-        (lookup(health, "memorised"), 2),
-        (lookup(health, f"{side}.jsd_bound"), 2),
-        (lookup(health, f"{side}.ece"), 2),
-        (lookup(health, "slope_p99"), 1),
-    ]
-    return [_text(value, digits) for value, digits in values]
+    return [*(_text(lookup(health, key), 2) for key in keys), _text(lookup(health, "slope_p99"), 1)]
 
 
 def _add(table: Table, name: str, row: object, grey: bool = False) -> None:

@@ -160,8 +160,8 @@ def _auroc(evaluation: Mapping[str, Any]) -> KeyNumber:
     return KeyNumber(
         name,
         f"{auroc:.2f}",
-        f"In {percent(auroc)} of pairs the held-out expert step earns more than the policy's step; "
-        "50 % means that the reward cannot tell them apart, which is where good imitation leads.",
+        f"In {percent(auroc)} of pairs the expert's step has the higher logit (of AIRL: f) than the "
+        "policy's; 50 % means that it cannot tell them apart, which is where good imitation leads.",
     )
 
 

@@ -75,16 +75,25 @@ def _nearest(run: RunFiles) -> str:
 
 
 def _terms(run: RunFiles) -> str:
-    """What it pays for, by the share of its variance."""
+    """What it pays for, by the share of its variance, and what it pays for the other way round."""
     weights, explained = lookup(run.evaluation, "terms.weights"), number(run.evaluation, "terms.explained")
     if not isinstance(weights, Mapping) or explained is None:
         return ""
-    shares = [(number(row, "share") or 0.0, str(name)) for name, row in weights.items()]
-    paid = ", ".join(f"{name} {percent(share)}" for share, name in sorted(shares, reverse=True) if share > 0)
+    rows = [(number(row, "share") or 0.0, str(name), _sign(row)) for name, row in weights.items()]
+    paid = ", ".join(f"{name} {percent(n)}{sign}" for n, name, sign in sorted(rows, reverse=True) if n > 0)
     shaping = number(run.evaluation, "terms.shaping")
     paid += f", a potential's shaping {percent(shaping)}" if paid and shaping and shaping >= NOTHING else ""
     rest = percent(max(0.0, 1 - explained))
     return f"What it pays for, of its variance: {paid or 'no term'}; {rest} is nothing the hand-written has."
+
+
+def _sign(row: object) -> str:
+    """What a share, which has no sign, leaves out of its term's weight."""
+    weight, low, high = (number(row, key) for key in ("weight", "low", "high"))
+    said = "" if weight is None or weight >= 0 else " with the opposite sign"
+    if low is not None and high is not None and low <= 0 <= high:
+        said = " with a sign that is not known"
+    return said + (" (a weight that is not identifiable)" if lookup(row, "why_not") else "")
 
 
 def _cannot(run: RunFiles) -> str:

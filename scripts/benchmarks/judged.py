@@ -9,10 +9,13 @@ Distances to the hand-written reward, weights of its terms, cross-play, drift ov
 discriminator's health, verdicts; numbers to four digits. Writes results/rewards/<reward>-<task>-s<seed>.json,
 where a reward is a method, `airl-f` (of `irl evaluate --part f`), `airl-states` (g of states alone), or one
 of these with `-average` (of `irl evaluate --average`). Files without a seed are older, and have fewer of
-these.
+these. The table has no number of a reward that was judged on another probe, or by another discount, than the
+others of its task.
 """
 
 import json
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -101,8 +104,31 @@ def _names(cross_play: dict[str, Any]) -> list[str]:
     return [policy["name"] for policy in cross_play["policies"]]
 
 
-def row(found: dict[str, Any]) -> str:
-    """One line of the table."""
+def probe_of(found: dict[str, Any]) -> tuple[str, str, float]:
+    """What two rewards have to share for their numbers to be compared: task, probe and discount."""
+    return found["task"], found["distances"]["probe_sha256"], found["distances"]["gamma"]
+
+
+def usual(rows: Sequence[dict[str, Any]]) -> set[tuple[str, str, float]]:
+    """By which most rewards of each task were judged; of two as frequent, by the larger probe."""
+    often = Counter(map(probe_of, rows))
+    steps = {probe_of(found): found["distances"]["steps"] for found in rows}
+    return set({of[0]: of for of in sorted(often, key=lambda of: (often[of], steps[of]))}.values())
+
+
+def alone(found: dict[str, Any], usually: set[tuple[str, str, float]]) -> str | None:
+    """Why a reward's numbers cannot stand beside those of its task; None where they can."""
+    if probe_of(found) in usually:
+        return None
+    _, digest, gamma = probe_of(found)
+    return f"on another probe: {digest[:8]}, {found['distances']['steps']:,} steps, gamma {gamma:g}"
+
+
+def row(found: dict[str, Any], why_not: str | None = None) -> str:
+    """One line of the table; `why_not` where its numbers are no others' to be compared with."""
+    score = f"{found['score']:.3f}"
+    if why_not:
+        return f"| {' | '.join((*_whose(found), score, *'–––––––', why_not))} |"
     terms, distance, agrees = found["terms"], found["distances"]["headline"], found["cross_play"]
     forward = (terms.get("weights") or {}).get("forward")
     said = f"{forward['weight']:.2f} ({forward['low']:.2f} to {forward['high']:.2f})" if forward else "–"
@@ -110,7 +136,7 @@ def row(found: dict[str, Any]) -> str:
     fired = ", ".join(name for name, is_so in found["verdicts"].items() if is_so) or "none"
     cells = (
         *_whose(found),
-        f"{found['score']:.3f}",
+        score,
         f"{distance['value']:.2f}",
         said,
         _two(terms.get("survival_bonus")),
@@ -143,8 +169,10 @@ def tables(out: Path) -> str:
     head = (*known, "Spearman", "Kendall", "regret", "verdicts")
     files = [json.loads(file.read_text()) for file in sorted(out.glob("*.json"))]
     full = [found for found in files if "verdicts" in found]
-    ends = [f"| {' | '.join(head)} |", "|---" * len(head) + "|", *map(row, full)]
-    return "\n".join([*ends, "", *map(over_run, full)])
+    usually = usual(full)
+    ends = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    ends += [row(found, alone(found, usually)) for found in full]
+    return "\n".join([*ends, "", *(over_run(found) for found in full if not alone(found, usually))])
 
 
 def main(settings: Settings) -> None:

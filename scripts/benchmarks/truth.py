@@ -3,8 +3,9 @@
     python scripts/benchmarks/truth.py [--only airl gail] [--tasks Hopper-v5]
 
 Runs nothing: it joins what judged.py, retrained.py and transferred.py left in results. Of retrained policies
-those count that learned from the reward at the end of its run, by the task's learner below. FINDINGS.md has
-the table, which a test makes again.
+those count that learned from the reward at the end of its run, by the task's learner below. A reward that was
+judged on another probe than the others of its task, or by another discount, has no numbers of that probe.
+FINDINGS.md has the table, which a test makes again.
 """
 
 import json
@@ -17,7 +18,7 @@ from typing import Any
 import tyro
 
 # beside this file
-from judged import HAND_WRITTEN, reward_name
+from judged import HAND_WRITTEN, alone, reward_name, usual
 from judged import RESULTS as REWARDS
 
 from irl.envs.tasks import task_name
@@ -39,7 +40,7 @@ HEAD = (
     "VAL",
     "shares of forward, ctrl",
     "ctrl to forward",
-    "bonus",
+    "bonus to forward",
     "explained",
     "Kendall",
     "a fresh policy",
@@ -106,13 +107,13 @@ def same(row: dict[str, Any], found: dict[str, Any]) -> bool:
     return by and row["run"] == run and reward_of(row) == found["reward"]
 
 
-def line(found: dict[str, Any], fresh: list[dict[str, Any]], controls: dict[tuple[Any, ...], Any]) -> str:
-    """A row; a dash is what is unknown, or may not be believed."""
-    terms, weights = found["terms"], found["terms"].get("weights") or {}
-    forward, ctrl = weights.get("forward", {}), weights.get("ctrl", {})
-    # to forward, so both have to be believed
-    known = forward.get("why_not") is None and ctrl.get("why_not") is None
-    believed = ctrl.get("relative") if known else None
+def line(
+    found: dict[str, Any],
+    fresh: list[dict[str, Any]],
+    controls: dict[tuple[Any, ...], Any],
+    why_not: str | None = None,
+) -> str:
+    """A row; a dash is what is unknown, or may not be believed; `why_not` (judged.alone) is said instead."""
     here = [row for row in fresh if "dynamics" not in row]
     control = [controls[key]["score"] for key in map(circumstances, here) if key in controls]
     taught = [f"{row['score']:.3f} ({row['score'] / row['score_of_the_run']:.2f})" for row in here]
@@ -122,18 +123,48 @@ def line(found: dict[str, Any], fresh: list[dict[str, Any]], controls: dict[tupl
         found["task"].removesuffix("-v5"),
         str(found["seed"]),
         f"{found['score']:.3f}",
-        _two(found["distances"]["headline"]["value"]),
-        f"{_two(forward.get('share'))}, {_two(ctrl.get('share'))}",
-        _two(believed),
-        _two(terms.get("survival_bonus")),
-        _two(terms.get("explained")),
-        _two(found["cross_play"]["kendall"]["value"]),
+        *(judged_by_probe(found) if why_not is None else "––––––"),
         "; ".join(taught) or "–",
         "; ".join(f"{score:.3f}" for score in control) or "–",
         "; ".join(there) or "–",
-        ", ".join(name for name, fired in found["verdicts"].items() if fired) or "none",
+        why_not or ", ".join(name for name, fired in found["verdicts"].items() if fired) or "none",
     )
     return f"| {' | '.join(cells)} |"
+
+
+def judged_by_probe(found: dict[str, Any]) -> tuple[str, ...]:
+    """VAL, shares, what control and not ending weigh to forward, what is explained, Kendall."""
+    terms, weights = found["terms"], found["terms"].get("weights") or {}
+    forward, ctrl = weights.get("forward", {}), weights.get("ctrl", {})
+    # to forward, so a forward that may weigh nothing is the unit of neither
+    unit = abs(forward["weight"]) if forward.get("why_not") is None and _sided(forward) else None
+    control = ctrl.get("weight") if ctrl.get("why_not") is None else None
+    return (
+        _two(found["distances"]["headline"]["value"]),
+        f"{_share(forward)}, {_share(ctrl)}",
+        _two(_over(control, unit)),
+        _two(_over(terms.get("survival_bonus"), unit)),
+        _two(terms.get("explained")),
+        _two(found["cross_play"]["kendall"]["value"]),
+    )
+
+
+def _sided(weight: dict[str, Any]) -> bool:
+    """Whether its interval lies on one side of 0."""
+    low, high = weight.get("low"), weight.get("high")
+    return low is not None and high is not None and (low > 0 or high < 0)
+
+
+def _share(weight: dict[str, Any]) -> str:
+    """A share and the sign of its weight, which it does not have: (-) below 0, (?) on both sides of it."""
+    sign = ""
+    if weight.get("low") is not None:
+        sign = " (?)" if not _sided(weight) else " (-)" if weight["high"] < 0 else ""
+    return _two(weight.get("share")) + sign
+
+
+def _over(value: float | None, unit: float | None) -> float | None:
+    return None if value is None or unit is None else value / unit
 
 
 def elsewhere(row: dict[str, Any], control: dict[str, Any] | None) -> str:
@@ -158,13 +189,15 @@ def table(settings: Settings) -> str:
     fresh = [row for row in rows if "snapshot" in row]
     controls = {circumstances(row): row for row in fresh if reward_of(row) == HAND_WRITTEN}
     judged = [found for found in read(results / "rewards") if "verdicts" in found]
+    usually = usual(judged)
     lines = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"]
     for found in sorted(judged, key=lambda of: (of["task"], of["method"], of["reward"], of["seed"])):
         if settings.only and found["method"] not in settings.only:
             continue
         if settings.tasks and found["task"] not in settings.tasks:
             continue
-        lines.append(line(found, [row for row in fresh if same(row, found)], controls))
+        of_it = [row for row in fresh if same(row, found)]
+        lines.append(line(found, of_it, controls, alone(found, usually)))
     return "\n".join(lines)
 
 

@@ -33,6 +33,13 @@ def test_every_stratum_keeps_its_size() -> None:
     assert drawn.shape == (50, 30)
 
 
+def test_strata_need_not_lie_one_after_the_other() -> None:
+    mixed = np.array([1, 0, 1, 1, 0, 2])
+    drawn = bootstrap.within(mixed, 200, stream(0, "draws"))
+    assert [set(drawn[:, mixed == one].sum(1).tolist()) for one in range(3)] == [{2}, {3}, {1}]
+    assert drawn[:, mixed == 1].std() > 0
+
+
 def test_the_interval_holds_the_truth_about_as_often_as_it_says() -> None:
     # 0.7 by construction, up to the noise in each column
     true, held = 0.7 / np.sqrt((1 + 0.01) * (0.98 + 0.01)), 0

@@ -41,7 +41,9 @@ def shaped(of: Episode, gamma: float = GAMMA, constant: float = 0.0) -> np.ndarr
 
 
 def found(learned: list[np.ndarray], episodes: list[Episode] = EPISODES) -> Attribution:
-    return attribute(episodes, learned, gamma=GAMMA, rng=np.random.default_rng(0), redraws=100)
+    stratum = np.zeros(len(episodes), dtype=int)
+    rng = np.random.default_rng(0)
+    return attribute(episodes, learned, stratum=stratum, gamma=GAMMA, rng=rng, redraws=100)
 
 
 def noisy(seed: int = 5, size: float = 0.3) -> list[np.ndarray]:
@@ -122,6 +124,20 @@ def test_the_same_generator_gives_the_same_intervals() -> None:
     assert found(noisy()) == found(noisy())
 
 
+def test_episodes_are_drawn_again_within_their_stratum() -> None:
+    """Alike within each, so every resample is the whole again, whatever lies between the strata."""
+    episodes = [EPISODES[0]] * 6 + [EPISODES[1]] * 6
+    stratum, slopes = np.repeat([0, 1], 6), np.repeat([1.0, 0.1], 6)
+    learned = [slope * e.terms["forward"] for slope, e in zip(slopes, episodes, strict=True)]
+    rng = np.random.default_rng(0)
+    forward = attribute(episodes, learned, stratum=stratum, gamma=GAMMA, rng=rng).terms["forward"]
+    assert 0.2 < forward.weight < 0.9
+    assert forward.low == pytest.approx(forward.weight, abs=1e-9)
+    assert forward.high == pytest.approx(forward.weight, abs=1e-9)
+    at_once = attribute(episodes, learned, stratum=0 * stratum, gamma=GAMMA, rng=rng).terms["forward"]
+    assert at_once.high - at_once.low > 0.1
+
+
 def test_what_it_cannot_do_is_said() -> None:
     learned = [e.reward for e in EPISODES]
     rng = np.random.default_rng(0)
@@ -138,7 +154,9 @@ def test_what_it_cannot_do_is_said() -> None:
         ),
     ):
         with pytest.raises(ValueError, match=message):
-            attribute(episodes, rewards, gamma=GAMMA, rng=rng)
+            attribute(episodes, rewards, stratum=np.zeros(len(episodes), int), gamma=GAMMA, rng=rng)
+    with pytest.raises(ValueError, match="stratum of each episode: 3 != 24"):
+        attribute(EPISODES, learned, stratum=np.zeros(3, int), gamma=GAMMA, rng=rng)
 
 
 def test_the_fit_from_grams_is_least_squares_on_the_steps() -> None:

@@ -60,6 +60,14 @@ def test_a_snapshot_that_says_nothing_has_no_place() -> None:
     assert np.isfinite(moved.map[1:]).all()
 
 
+def test_a_snapshot_in_between_that_says_nothing_leaves_no_length_of_the_way() -> None:
+    a, b = axes(2).T
+    moved = trajectory(np.column_stack([a, 1e-9 * a, b]), a, np.ones(3))
+    assert np.isnan(moved.speed).all()
+    assert moved.matrix[0, 2] == pytest.approx(np.sqrt(0.5))
+    assert np.isnan(moved.cycling)
+
+
 def test_signs_and_orders_are_counted() -> None:
     before, after = np.array([1.0, 2, -3, 4]), np.array([1.0, -2, -3, 4])
     assert flips(before, after) == 0.25

@@ -38,3 +38,11 @@ def test_where_no_terms_were_recorded_it_says_so() -> None:
     base = ProbeSet("PointMass-v0", {"expert": tuple(pointmass.demonstrations(3))})
     found = judge_terms(HandWritten(), base, 0.99, 0)
     assert found == {"reason": "these episodes have no term of the hand-written reward in common"}
+
+
+def test_intervals_are_of_episodes_drawn_within_their_kind_of_play(probe: ProbeSet) -> None:
+    """With one episode, many times, in each kind there is nothing to draw."""
+    kinds = {name: (episodes[0],) * 5 for name, episodes in probe.items()}
+    found = judge_terms(lambda batch: batch.obs[:, 5] ** 2, ProbeSet("Hopper-v5", kinds), 0.99, 0)
+    forward = found["weights"]["forward"]
+    assert forward["low"] == pytest.approx(forward["high"], rel=1e-6)

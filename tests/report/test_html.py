@@ -1,5 +1,6 @@
 import dataclasses
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -65,12 +66,23 @@ def test_a_run_that_went_on_by_other_code_says_so(run: Path) -> None:
     assert "commit dd1a33c0ff" in write_report(run).read_text()
 
 
-def test_a_tree_that_explains_nothing_is_not_shown(run: Path, evaluation: dict[str, Any]) -> None:
+def test_a_fit_that_explains_nothing_is_not_shown(run: Path, evaluation: dict[str, Any]) -> None:
     whole.write(run, whole.grow(evaluation, 3))
-    assert "a tree ensemble explains 80 % of it" in write_report(run).read_text()
+    assert "a nonlinear fit explains 80 % of it" in write_report(run).read_text()
     page = _change(run, whole.grow(evaluation, 3) | {"residual": {"r2": -3.2, "features": [{"name": "x"}]}})
     assert "320 %" not in page
-    assert "a tree ensemble explains none of it" in page
+    assert "a nonlinear fit explains none of it" in page
+
+
+@pytest.mark.parametrize("r2", [0.8, -3.2])
+def test_no_tree_is_spoken_of(run: Path, evaluation: dict[str, Any], r2: float) -> None:
+    """What explains the rest is random waves and a ridge (irl.diagnostics.residual)."""
+    features = [{"name": "x", "importance": 1.0}]
+    whole.write(run, whole.grow(evaluation, 3) | {"residual": {"r2": r2, "features": features}})
+    # plotly's own text knows of trees
+    said = re.sub(r"<script.*?</script>", "", write_report(run).read_text(), flags=re.DOTALL)
+    assert "What the unexplained part depends on" in said
+    assert not re.search(r"\btree|\bforest", said, re.IGNORECASE)
 
 
 def test_a_verdict_says_on_which_side_its_threshold_is(run: Path, evaluation: dict[str, Any]) -> None:

@@ -29,6 +29,8 @@ def probed(evaluation: dict[str, Any]) -> dict[str, Any]:
             row(0.004),
             row(None, n=100, reason="segments of 100 steps fit into 0 of 60"),
         ],
+        # of files that are older, which are read all the same
+        "uncentred": 0.25,
         "references": [row(0.31, name="epic", n=None)],
         "strata": strata,
         "notes": ["medium: no medium policy is shelved"],
@@ -84,6 +86,19 @@ def test_a_distance_below_its_own_error_is_no_number_in_the_drift_either(probed:
     probed["drift"]["to_truth"] = [row(0.004)] * len(probed["drift"]["snapshots"])
     lines = [line.split() for line in printed(probed).splitlines()]
     assert next(words for words in lines if len(words) == 7 and words[0] == "0")[1] == "n.d."
+
+
+def test_where_nothing_is_held_out_it_is_of_training_demonstrations_and_bounds_nothing(
+    probed: dict[str, Any],
+) -> None:
+    def words() -> str:
+        return " ".join(printed(probed).split("the discriminator")[1].split())
+
+    assert words().startswith("step AUROC by heart JSD ≥ ECE slope")
+    for row in probed["drift"]["health"]:
+        row |= {"held_out": None, "memorised": None}
+    assert words().startswith(", on training demonstrations step AUROC ECE slope ")
+    assert " 0 0.91 0.10 2.0 " in words()
 
 
 def test_no_number_is_cut_short_in_eighty_columns(probed: dict[str, Any]) -> None:

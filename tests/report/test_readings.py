@@ -47,6 +47,15 @@ def test_what_is_not_known_has_the_reason_of_the_file(evaluation: dict[str, Any]
     assert headline(evaluation).startswith("The policy returns 3,4")
 
 
+def test_the_separation_is_said_to_be_by_the_logit(evaluation: dict[str, Any]) -> None:
+    """It is read off the logit (judge.py), which of AIRL is no reward that is judged but f."""
+    evaluation["reward"]["auroc"] = 0.95
+    (row,) = [row for row in key_numbers(evaluation) if row.name == "AUROC, expert against policy"]
+    assert row.value == "0.95"
+    assert "In 95 % of pairs the expert's step has the higher logit (of AIRL: f)" in row.reading
+    assert "earns" not in row.reading
+
+
 def test_a_reward_that_stood_still_is_said_to(evaluation: dict[str, Any]) -> None:
     evaluation["drift"]["changes"][-1].update(offset=0.0, scale=0.0, shape=0.0, total=0.0)
     assert "stood still" in key_numbers(evaluation)[-1].reading

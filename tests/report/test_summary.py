@@ -43,6 +43,37 @@ def test_the_page_begins_with_what_it_comes_to(run: Path, evaluation: dict[str, 
         assert words in text, words
 
 
+@pytest.mark.parametrize(
+    ("weight", "low", "high", "why_not", "said"),
+    [
+        (0.3, 0.2, 0.4, None, "ctrl 31 %, forward 15 %;"),
+        (-889.4, -950.2, -694.3, None, "ctrl 31 % with the opposite sign, forward 15 %;"),
+        (-889.4, -950.2, -694.3, "4e-07", "the opposite sign (a weight that is not identifiable), forward"),
+        (0.04, -0.02, 0.07, None, "ctrl 31 % with a sign that is not known, forward"),
+        (-0.04, None, None, None, "ctrl 31 % with the opposite sign, forward"),
+    ],
+)
+def test_a_share_says_the_sign_of_its_weight(
+    run: Path,
+    evaluation: dict[str, Any],
+    weight: float,
+    low: float | None,
+    high: float | None,
+    why_not: str | None,
+    said: str,
+) -> None:
+    """A reward that pays for large actions pays for ctrl the other way round."""
+    forward = {"weight": 0.28, "low": 0.17, "high": 0.41, "share": 0.15, "why_not": None}
+    ctrl = {"weight": weight, "low": low, "high": high, "share": 0.31, "why_not": why_not}
+    constant = {"weight": None, "low": None, "high": None, "share": 0.0, "why_not": "it is 1 on every step"}
+    weights = {"forward": forward, "ctrl": ctrl, "survive": constant}
+    evaluation["terms"] = {"weights": weights, "explained": 0.46}
+    (run / "evaluation.json").write_text(json.dumps(evaluation))
+    text = " ".join(summary(read_run(run)))
+    assert said in text
+    assert "survive" not in text
+
+
 def test_a_reward_that_was_nearer_before_is_said_to_have_gone_away(
     run: Path, evaluation: dict[str, Any]
 ) -> None:

@@ -145,14 +145,14 @@ def _notes(run: RunFiles) -> tuple[str, ...]:
             f"Survival bonus: not ending the episode pays {bonus:+.3g} a step, with the discounted offset.",
         )
     if r2 is not None and r2 <= 0:
-        notes += ("What the unexplained part depends on was not found: a tree ensemble explains none of it.",)
+        notes += ("What the unexplained part depends on was not found: a nonlinear fit explains none of it.",)
     return notes
 
 
 def _residual(run: RunFiles) -> Table | None:
-    """What else it pays for: what a tree ensemble finds in the part that no term explains."""
+    """What else it pays for: what random waves and a ridge find in the part that no term explains."""
     features, r2 = lookup(run.evaluation, "residual.features"), number(run.evaluation, "residual.r2")
-    # a tree that does worse than the mean has found nothing, and its importances mean nothing
+    # a fit that does worse than the mean has found nothing, and its importances mean nothing
     if not isinstance(features, list) or (r2 is not None and r2 <= 0):
         return None
     rows = [
@@ -160,7 +160,7 @@ def _residual(run: RunFiles) -> Table | None:
         for row in features[:8]
         if isinstance(row, Mapping)
     ]
-    said = "" if r2 is None else f" (a tree ensemble explains {100 * r2:.0f} % of it)"
+    said = "" if r2 is None else f" (a nonlinear fit explains {100 * r2:.0f} % of it)"
     return (
         Table(("input", "importance"), rows, f"What the unexplained part depends on{said}") if rows else None
     )
