@@ -15,6 +15,7 @@ from irl.core.rng import episode_seeds, stream
 from irl.core.types import Episode, RewardFn, Transitions, from_episodes
 from irl.envs.make import make
 from irl.envs.rollouts import random_act, rollout
+from irl.rewards.learned import LearnedReward
 
 STRATA = ("expert", "policy", "random")
 MOST_STEPS = 5000
@@ -70,8 +71,13 @@ def read(reward: RewardFn, batch: Transitions) -> Float[np.ndarray, "B"]:
     """The reward of each step for itself, in float64.
 
     What a reward adds at a termination for the time after it (`irl.rewards.tail`) is left out: it is the
-    worth of a hundred steps on one of them, and the hand-written reward has nothing beside it.
+    worth of a hundred steps on one of them, and the hand-written reward has nothing beside it. The step
+    itself is as it was learned, into the absorbing state where there is one: of a learned reward it is
+    `LearnedReward.anchored` but for a constant.
     """
-    steps = replace(batch, terminated=torch.zeros_like(batch.terminated))
     with torch.no_grad():
-        return reward(steps).double().cpu().numpy()
+        if isinstance(reward, LearnedReward):
+            of_steps, _ = reward.steps_and_absorbing(batch)
+        else:
+            of_steps = reward(replace(batch, terminated=torch.zeros_like(batch.terminated)))
+        return of_steps.double().cpu().numpy()

@@ -118,11 +118,11 @@ def _curve(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _reward(found: Mapping[str, Any], snapshot: int | None = None) -> dict[str, Any] | None:
-    """Of a reward, how far it is from the hand-written one and what it pays for; of `bc`, None.
+    """Of a reward, how far it is from the hand-written one and what it pays for; None of `bc`, and unjudged.
 
     The weights are those of the last snapshot, the only one they are calculated for.
     """
-    if "distances" not in found:
+    if "headline" not in found.get("distances", {}):
         return None
     agreement = {name: found["reward"][name] for name in ("pearson", "spearman", "auroc")}
     distance, terms = found["distances"]["headline"], found["terms"]

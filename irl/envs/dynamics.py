@@ -14,6 +14,7 @@
 A number is a factor. The changed model is an argument (`xml_file`) of the environment, made anew from
 Gymnasium's file each time and kept nowhere, so the name and Gymnasium's version say all of it. Rewards,
 observations and actions are the task's own. MuJoCo lets two touching geometries share the larger friction.
+What a model cannot feel is refused: gravity where no joint bears weight, friction where nothing rubs.
 
 Fu et al. (2018), arXiv:1710.11248, take a reward to an ant of which two front legs are disabled; theirs is
 another ant, and how short its legs are is not known here.
@@ -30,6 +31,8 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import mujoco
+import numpy as np
 from gymnasium.envs.mujoco import mujoco_env
 from gymnasium.envs.registration import load_env_creator
 
@@ -46,6 +49,10 @@ SHORT = 0.5
 """Of a leg's length, what a disabled one has."""
 ANT = "Ant-v5"
 _MOST = 1000.0
+_NO_WEIGHT = 1e-9
+"""Of a model's weight: what a joint bears below it is rounding."""
+_PLACES = 3
+"""Postures in which weight is asked for: in one alone it may be balanced."""
 _HINT = f"expected factors of {', '.join(FACTORS)} above 0, or {LEGS} of 1 to 3 of {ANT}, e.g. mass=1.5"
 
 
@@ -99,6 +106,48 @@ def change(root: ET.Element, changes: Mapping[str, float]) -> None:
             _scale(root, "joint", "damping", 0.0, factor)
         elif name == LEGS:
             _disable(root, int(factor))
+
+
+def check_felt(env: gym.Env, env_id: str, changes: object) -> None:
+    """Refuse changes that leave every motion of a compiled model as it was.
+
+    Raises:
+        UserError: gravity is changed and pulls at no joint, or friction and no contact has any.
+    """
+    base = env.unwrapped
+    # `changed_model` admits no others
+    assert isinstance(base, mujoco_env.MujocoEnv)
+    assert isinstance(changes, Mapping)
+    said = "and a factor changes nothing; choose another change"
+    if "gravity" in changes and not _bears_weight(base.model):
+        raise UserError(f"no joint of {env_id} feels gravity, {said}")
+    if "friction" in changes and not _rubs(base.model):
+        raise UserError(f"nothing of {env_id} touches with friction, {said}")
+
+
+def _bears_weight(model: Any) -> bool:
+    """Whether gravity pulls at a joint, in some posture."""
+    # the bindings have them, their type stubs lack them
+    made, normalise, forward = (getattr(mujoco, n) for n in ("MjData", "mj_normalizeQuat", "mj_forward"))
+    data, rng = made(model), np.random.default_rng(0)
+    least = _NO_WEIGHT * np.abs(model.opt.gravity).max() * model.body_mass.sum()
+    for _ in range(_PLACES):
+        data.qpos[:] = model.qpos0 + rng.uniform(-0.5, 0.5, model.nq)
+        normalise(model, data.qpos)
+        forward(model, data)
+        # at rest nothing else is in it
+        if np.abs(data.qfrc_bias).max(initial=0.0) > least:
+            return True
+    return False
+
+
+def _rubs(model: Any) -> bool:
+    """Whether two geometries of two bodies may touch with friction; of one dimension, a contact has none."""
+    touches = model.geom_contype[:, None] & model.geom_conaffinity
+    touches = ((touches | touches.T) != 0) & (model.geom_bodyid[:, None] != model.geom_bodyid)
+    # the larger of two dimensions counts
+    rubs = np.maximum(model.geom_condim[:, None], model.geom_condim) > 1
+    return bool((touches & rubs).any() or (model.pair_dim > 1).any())
 
 
 def _check_not_zero(name: str, elements: Iterable[ET.Element]) -> None:

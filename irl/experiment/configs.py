@@ -2,20 +2,24 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar
 
 from irl.algorithms.adversarial import ReplayedScheduleConfig, ScheduleConfig
 from irl.algorithms.bc import CloningConfig
 from irl.algorithms.interleaved import InterleavedConfig
 from irl.core import products
 from irl.core.config import check_at_least, check_seed, check_threads, check_widths
+from irl.core.errors import UserError
 from irl.discriminators.airl import AIRLConfig
 from irl.discriminators.dac import DACConfig
 from irl.discriminators.gail import GAILConfig
 from irl.experiment.imitation_run import AdversarialRun, ImitationRun, Watch
+from irl.learners.off_policy_config import OffPolicyConfig
 from irl.learners.ppo import PPOConfig
 from irl.learners.sac import SACConfig
 from irl.learners.td3 import TD3Config
+
+OffPolicy = TypeVar("OffPolicy", bound="OffPolicyRun")
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,37 @@ OFF_POLICY_TD3 = TD3Config(learning_starts=1000, products=products.fastest())
 """TD3 beside a discriminator, or on what one left."""
 
 
+def untaught(learner: PPOConfig | OffPolicyConfig, steps: int) -> str:
+    """Why a run of so many steps leaves the policy as it began, and what to type; empty where it learns."""
+    first, linear = learner.steps_per_round, learner.lr_schedule == "linear"
+    # the last round is played to its end
+    played = -(-steps // first) * first
+    if isinstance(learner, OffPolicyConfig):
+        first = (learner.learning_starts // learner.n_envs + 1) * learner.n_envs
+    if first > played:
+        why = f"and the run ends at {played}"
+    elif linear and first >= steps:
+        why = "where lr_schedule linear has come to 0"
+    else:
+        return ""
+    return (
+        f"--steps {steps} leaves the policy as it began: the first update of {learner.KIND.upper()} is at "
+        f"step {first}, {why}; choose --steps {first + linear} or more"
+    )
+
+
+def check_learns(learner: PPOConfig | OffPolicyConfig, steps: int) -> None:
+    """Refuse a run off policy that ends before its first update.
+
+    A single round of PPO passes: beside a discriminator, the reward learns in it.
+
+    Raises:
+        UserError: it does.
+    """
+    if isinstance(learner, OffPolicyConfig) and (why := untaught(learner, steps)):
+        raise UserError(why)
+
+
 @dataclass(frozen=True)
 class OffPolicyRun(AdversarialRun):
     """What every method that learns off policy is told besides."""
@@ -68,7 +103,17 @@ class OffPolicyRun(AdversarialRun):
     """How many of its episodes to learn from; the rest is held out for `irl evaluate`."""
     steps: int = 150_000
     """Environment steps in all."""
+    learner: SACConfig | TD3Config = OFF_POLICY
     schedule: InterleavedConfig = field(default_factory=InterleavedConfig)
+
+    def resolved(self: OffPolicy) -> OffPolicy:
+        """As of every method, for a run to come.
+
+        Raises:
+            UserError: it would end before its first update. Settings of earlier runs that did are still read.
+        """
+        check_learns(self.learner, self.steps)
+        return super().resolved()
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from irl.experiment.gate import broken, read_gate
 from irl.experiment.judge import finite, judge_drift, judge_reward
 from irl.experiment.probed import Asked, Named, probed
 from irl.experiment.progress import each_episode, progress
-from irl.experiment.references import references_of
+from irl.experiment.references import NO_RETURN, references_of, why_unscored
 from irl.experiment.snapshots import every_snapshot
 from irl.policies.card import normalised_score, summary
 from irl.policies.policy import Policy
@@ -39,9 +39,6 @@ from irl.report.tables import evaluation_table
 
 EVALUATION = "evaluation.json"
 """The one that the report shows."""
-NO_RETURN = "the task's own reward is not a finite number"
-NO_REFERENCE = "no expert or random return is known for this task"
-NO_SCALE = "the expert's return and that of random actions are equal, so there is no scale between them"
 
 
 @dataclass(frozen=True)
@@ -175,13 +172,10 @@ def _play(env_id: str, policy: Policy, command: Evaluate) -> list[Episode]:
 def _policy(episodes: Sequence[Episode], references: dict[str, Any]) -> dict[str, Any]:
     measured = summary(list(episodes))
     random, expert = references["random"], references["expert"]
-    score = normalised_score(
-        measured.return_mean,
-        random["return_mean"] if random else None,
-        expert["return_mean"] if expert else None,
-    )
+    ends = (random["return_mean"] if random else None, expert["return_mean"] if expert else None)
+    score = normalised_score(measured.return_mean, *ends)
     known = np.isfinite(measured.return_mean)
-    unscored = NO_RETURN if not known else NO_SCALE if random and expert else NO_REFERENCE
+    unscored = why_unscored(measured.return_mean, *ends)
     return {
         "return_mean": finite(measured.return_mean),
         "return_mean_reason": None if known else NO_RETURN,

@@ -17,7 +17,7 @@ from irl.envs.make import check_module, make
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
-from irl.experiment.configs import ExpertRun
+from irl.experiment.configs import ExpertRun, check_learns
 from irl.experiment.imitation_run import Watch, Words
 from irl.experiment.play import MAY_CHANGE, Player
 from irl.experiment.recipes import recipe
@@ -122,7 +122,7 @@ def _expert_run(command: TrainExpert) -> ExpertRun:
     env_id = full_name(command.env_id, command.env_kwargs)
     algo, chosen = recipe(env_id, command.algo, command.level)
     task = task_name(env_id)
-    return ExpertRun(
+    run = ExpertRun(
         env_id=env_id,
         level=command.level,
         steps=chosen.steps if command.steps is None else command.steps,
@@ -133,6 +133,8 @@ def _expert_run(command: TrainExpert) -> ExpertRun:
         device="cpu",
         threads=command.threads,
     )
+    check_learns(run.learner, run.steps)
+    return run
 
 
 def _open_or_create(run: ExpertRun) -> records.RunFolder:

@@ -3,10 +3,23 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from irl.demos.load import Demos
 from irl.experiment.judge import finite
 from irl.policies import shelf
 from irl.policies.card import summary
+
+NO_RETURN = "the task's own reward is not a finite number"
+NO_REFERENCE = "no expert or random return is known for this task"
+NO_SCALE = "the expert's return and that of random actions are equal, so there is no scale between them"
+
+
+def why_unscored(return_mean: float, random: float | None, expert: float | None) -> str:
+    """Why a return that has no normalised score has none."""
+    if not np.isfinite(return_mean):
+        return NO_RETURN
+    return NO_REFERENCE if random is None or expert is None else NO_SCALE
 
 
 def references_of(env_id: str, demos: Demos, policies_root: Path | None) -> dict[str, Any]:

@@ -8,6 +8,7 @@ control: the task's own reward in its place.
 """
 
 import re
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -24,7 +25,15 @@ from irl.envs.make import check_module
 from irl.envs.names import full_name
 from irl.envs.tasks import task_name
 from irl.experiment import build
-from irl.experiment.configs import OFF_POLICY, OFF_POLICY_TD3, BCRun, Imitation, RetrainRun
+from irl.experiment.configs import (
+    OFF_POLICY,
+    OFF_POLICY_TD3,
+    BCRun,
+    Imitation,
+    RetrainRun,
+    check_learns,
+    untaught,
+)
 from irl.experiment.frozen import RECORD, frozen, frozen_again, recorded
 from irl.experiment.imitation_run import Watch, Words
 from irl.experiment.play import Player
@@ -59,8 +68,10 @@ class Retrain:
     """The mean of the rewards of this snapshot and of those before it, the untrained one left out: of what a
     fresh policy does first, early ones know more than the last."""
     hand_written: bool = False
-    """Learn from the task's own reward instead, all else as it is, first weights and normaliser too: what the
-    same learner makes of that in as many steps is what a recovered reward is held against."""
+    """Learn from the task's own reward instead, all else as it is: what the same learner makes of that in as
+    many steps is what a recovered reward is held against. The normaliser is the reward's, and PPO begins from
+    the same weights; SAC and TD3 do where the reward knows no absorbing state. Where it does, the task's own
+    pays nothing after a termination, so they lead none there, see one input less and draw other weights."""
     env_kwargs: Words = ()
     """Retrain where the task is another: what the environment is given beside what the run's was, name=value
     or a JSON object. Observations and actions must be of the same sizes."""
@@ -130,6 +141,8 @@ def retrain_one(command: Retrain) -> None:
         reward=reward,
     )
     player.run(to_go_on=f"irl retrain --resume {folder.path}")
+    if why := untaught(config.learner, config.steps):
+        print(f"irl: {why}", file=sys.stderr)
     report(config, folder, reward, command.policies_root)
 
 
@@ -145,6 +158,7 @@ def _begun(command: Retrain) -> tuple[RetrainRun, records.RunFolder]:
     step, snapshot = snapshot_of(source, command.snapshot)
     config = settled(command, its, step)
     reward = frozen(config, snapshot, command.part)
+    check_learns(config.learner, config.steps)
     there = records.RunFolder(config.out)
     if (config.out / "config.json").is_file() and there.config.get("kind") == RetrainRun.KIND:
         raise UserError(

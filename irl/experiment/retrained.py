@@ -22,6 +22,7 @@ from irl.experiment.judge import finite
 from irl.experiment.overoptimised import over_run
 from irl.experiment.play import EVALUATION, evaluated
 from irl.experiment.progress import each_episode, progress
+from irl.experiment.references import why_unscored
 from irl.policies import shelf
 from irl.policies.card import Card, normalised_score, summary
 from irl.policies.policy import load_policy
@@ -31,8 +32,6 @@ EPISODES = 20
 """Episodes of the deterministic policy, whose starts no training and no other evaluation has."""
 
 RESULT = "retrain.json"
-
-UNSCORED = "no expert of the task is on the shelf, or the return is not a finite number"
 
 
 def report(config: RetrainRun, folder: RunFolder, reward: LearnedReward, policies_root: Path | None) -> None:
@@ -83,12 +82,13 @@ def _true(episodes: Sequence[Episode], card: Card | None) -> dict[str, Any]:
     measured = summary(list(episodes))
     references = (card.random_return_mean, card.measured.return_mean) if card else (None, None)
     score = normalised_score(measured.return_mean, *references)
+    unscored = why_unscored(measured.return_mean, *references)
     return {
         "return_mean": finite(measured.return_mean),
         "return_std": finite(measured.return_std),
         "return_min": finite(measured.return_min),
         "normalised_score": finite(score),
-        "normalised_score_reason": None if np.isfinite(score) else UNSCORED,
+        "normalised_score_reason": None if np.isfinite(score) else unscored,
         "random_return_mean": references[0],
         "expert_return_mean": references[1],
         "returns": [finite(value) for value in measured.returns],

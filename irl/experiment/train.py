@@ -21,7 +21,14 @@ from irl.discriminators.ensemble import Ensemble
 from irl.discriminators.gail import GAIL
 from irl.envs.make import check_module
 from irl.experiment import build
-from irl.experiment.configs import BCRun, ExpertRun, FromDemonstrations, Imitation, RetrainRun
+from irl.experiment.configs import (
+    BCRun,
+    ExpertRun,
+    FromDemonstrations,
+    Imitation,
+    RetrainRun,
+    untaught,
+)
 from irl.experiment.draw import RECORD, draw, drawn, drawn_again
 from irl.experiment.play import Player
 from irl.experiment.seeds import train_seeds
@@ -108,6 +115,8 @@ def play(config: FromDemonstrations, demos: Demos, folder: records.RunFolder) ->
         snapshot=snapshot,
     )
     player.run(to_go_on=f"irl train --resume {folder.path}")
+    if not isinstance(config, BCRun) and (why := untaught(config.learner, config.steps)):
+        print(f"irl: {why}", file=sys.stderr)
     print(f"trained; judge it with: irl evaluate {folder.path}", file=sys.stderr)
 
 

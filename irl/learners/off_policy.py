@@ -181,7 +181,9 @@ class OffPolicyLearner(ABC, Generic[C, M, U]):
                 self._owed -= 1.0
         for what in ("critic", "actor"):
             check_finite(named(what, getattr(self.model, what).state_dict()))
-        self._average.update(self._weights())
+        # before anything is learned there is nothing to average but the random start
+        if self._update.updates:
+            self._average.update(self._weights())
         return self.venv.take().to(self.model.device)
 
     def _step(self) -> None:

@@ -39,16 +39,20 @@ def clipped(
 ) -> Float[Tensor, "B"]:
     """The log of p(clip(u)), u ~ N(mean, std): a density within the bounds, a mass from `EDGE` of them on.
 
-    Sums to one: over the inside by area, and over each bound as a point.
+    Sums to one: over the inside by area, and over each bound as a point. A box without an end has no share
+    of itself: there only an action on the bound that it has counts as at it.
     """
-    margin = EDGE * (high - low)
+    width = high - low
+    margin = torch.where(width.isfinite(), EDGE * width, 0.0)
     low, high = low + margin, high - margin
+    at_low, at_high = action <= low, action >= high
     std = log_std.exp()
     z = (action - mean) / std
     inside = -0.5 * z.square() - log_std - _LOG_ROOT_2_PI
-    at_low = log_ndtr((low - mean) / std)
-    at_high = log_ndtr((mean - high) / std)
-    of_dimensions = torch.where(action <= low, at_low, torch.where(action >= high, at_high, inside))
+    # bounds only where they count: far off one's gradient is NaN, and 0 times that is too
+    of_low = log_ndtr((torch.where(at_low, low, mean) - mean) / std)
+    of_high = log_ndtr((mean - torch.where(at_high, high, mean)) / std)
+    of_dimensions = torch.where(at_low, of_low, torch.where(at_high, of_high, inside))
     return of_dimensions.sum(1)
 
 

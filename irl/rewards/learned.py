@@ -93,17 +93,21 @@ class LearnedReward:
         Over any episode, followed by s_abs for ever, it adds up to r's discounted sum less r(s_abs) / (1 -
         gamma), which no policy changes. A reward that knows no s_abs is as it was.
         """
-        self._check(batch)
-        of_steps, of_absorbing = self._steps_and_absorbing(batch)
+        of_steps, of_absorbing = self.steps_and_absorbing(batch)
         return of_steps if of_absorbing is None else of_steps - of_absorbing
 
-    def _steps_and_absorbing(
-        self, batch: Transitions
-    ) -> tuple[Float[Tensor, "B"], Float[Tensor, "1"] | None]:
-        """What each step pays by itself, and what s_abs pays a step where it is known."""
+    def steps_and_absorbing(self, batch: Transitions) -> tuple[Float[Tensor, "B"], Float[Tensor, "1"] | None]:
+        """What each step pays by itself, and what s_abs pays a step where it is known.
+
+        A step that terminated is the one that the discriminator was shown, into s_abs where it knows one.
+
+        Raises:
+            ValueError: the batch is of another task.
+        """
+        self._check(batch)
         net, pays, gamma = self.net, self.spec.reward_map, self.spec.gamma
         if isinstance(net, EnsembleNet):
-            steps, ends = zip(*(m._steps_and_absorbing(batch) for m in self._members), strict=True)
+            steps, ends = zip(*(m.steps_and_absorbing(batch) for m in self._members), strict=True)
             known = [end for end in ends if end is not None]
             return combined(steps, net.spec.pays), combined(known, net.spec.pays) if known else None
         if isinstance(net, LogitNet):

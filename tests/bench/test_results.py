@@ -9,7 +9,7 @@ import pytest
 from irl.bench.cells import LATER, Cell, expand
 from irl.bench.comparable import comparable
 from irl.bench.grid import read_grid
-from irl.bench.results import read_results
+from irl.bench.results import _reward, read_results
 from irl.core.config import to_json
 
 GRID = """
@@ -60,3 +60,11 @@ def test_a_result_that_says_nothing_of_its_source_yet_is_kept(tmp_path: Path, ce
     write(folder, cells[1], older)
     (kept,), notes = comparable(read_results(folder, cells), cells)
     assert (kept["cell"], notes) == (to_json(cells[1]), [])
+
+
+def test_a_reward_that_could_not_be_judged_has_no_distance() -> None:
+    reason = "no task is known, so nobody can say"
+    assert _reward({}) is None
+    assert (
+        _reward({"distances": {"headline_reason": reason}, "reward": {}, "terms": {"reason": reason}}) is None
+    )

@@ -3,10 +3,13 @@
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 
 from irl.core.errors import UserError
+from irl.envs import dynamics
 from irl.envs.dynamics import named
 from irl.envs.make import make
 from irl.envs.names import full_name
@@ -107,8 +110,56 @@ def test_no_file_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         ("Pendulum-v1", {"mass": 2.0}, "no MuJoCo task"),
         ("Swimmer-v5", {"damping": 2.0}, "model's damping is 0"),
         ("Pusher-v5", {"gravity": 2.0}, "model's gravity is 0"),
+        ("Swimmer-v5", {"gravity": 0.5}, "no joint of Swimmer-v5 feels gravity"),
+        ("Reacher-v5", {"gravity": 0.5, "mass": 2.0}, "no joint of Reacher-v5 feels gravity"),
+        ("Swimmer-v5", {"friction": 2.0}, "nothing of Swimmer-v5 touches with friction"),
+        ("Reacher-v5", {"friction": 2.0}, "nothing of Reacher-v5 touches with friction"),
+        ("Pusher-v5", {"friction": 2.0}, "nothing of Pusher-v5 touches with friction"),
+        ("InvertedPendulum-v5", {"friction": 2.0}, "nothing of InvertedPendulum-v5 touches"),
+        ("InvertedDoublePendulum-v5", {"friction": 2.0}, "nothing of InvertedDoublePendulum-v5 touches"),
     ],
 )
 def test_what_is_no_change_is_one_line(env_id: str, changes: Any, said: str) -> None:
     with pytest.raises(UserError, match=said):
         make(env_id, dynamics=changes)
+
+
+def played(env_id: str, changes: dict[str, float] | None = None) -> np.ndarray:
+    """The states of forty random steps, whatever ends on the way."""
+    env = make(env_id, dynamics=changes) if changes else make(env_id)
+    base, rng = env.unwrapped, np.random.default_rng(0)
+    base.reset(seed=0)
+    box = env.action_space
+    assert isinstance(box, Box)
+    steps = [base.step(rng.uniform(box.low, box.high).astype(np.float32))[0] for _ in range(40)]
+    env.close()
+    return np.array(steps)
+
+
+@pytest.mark.parametrize("name", ["gravity", "friction"])
+@pytest.mark.parametrize(
+    "env_id",
+    [
+        *("Hopper-v5", "HalfCheetah-v5", "Walker2d-v5", "Ant-v5", "Humanoid-v5", "Swimmer-v5", "Reacher-v5"),
+        *("InvertedPendulum-v5", "InvertedDoublePendulum-v5"),
+    ],
+)
+def test_a_change_is_refused_just_where_no_step_would_differ(
+    env_id: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    try:
+        make(env_id, dynamics={name: 0.5}).close()
+        refused = False
+    except UserError:
+        refused = True
+    monkeypatch.setattr("irl.envs.make.check_felt", lambda *_: None)
+    assert refused == np.array_equal(played(env_id), played(env_id, {name: 0.5}))
+
+
+def test_two_geometries_of_an_explicit_pair_touch_whatever_their_masks() -> None:
+    geoms = """<worldbody><geom type="plane" size="1 1 1" name="a" contype="0" conaffinity="0"/>
+        <body><freejoint/><geom size="0.1" name="b" contype="0" conaffinity="0"/></body></worldbody>"""
+    for condim, rubs in ((1, False), (3, True)):
+        pair = f'<contact><pair geom1="a" geom2="b" condim="{condim}"/></contact>'
+        own = getattr(mujoco, "MjModel").from_xml_string(f"<mujoco>{geoms}{pair}</mujoco>")  # noqa: B009
+        assert dynamics._rubs(own) == rubs

@@ -120,6 +120,13 @@ def test_a_run_goes_on_from_another_folder_with_the_datasets_it_was_begun_with(
     irl("train", "--resume", "../run")
 
 
+def test_a_single_round_at_rate_0_is_said(train: Train, capfd: pytest.CaptureFixture) -> None:
+    train("short", "--steps=128")
+    assert "leaves the policy as it began: the first update of PPO is at step 128" in capfd.readouterr().err
+    train("long", "--steps=256")
+    assert "as it began" not in capfd.readouterr().err
+
+
 def test_a_rate_that_keeps_no_step_is_one_line_and_leaves_nothing(
     train: Train, capfd: pytest.CaptureFixture
 ) -> None:

@@ -189,6 +189,28 @@ def test_settings_that_contradict_are_refused(setting: dict[str, Any], message: 
         SACConfig(**setting)
 
 
+def test_rounds_before_anything_is_learned_count_nothing_in_the_average(tmp_path: Path) -> None:
+    config = replace(SMALL, learning_starts=200, average=0.9, lr=1e-2)
+    ours = learner(config=config)
+    ours.start(HandWritten())
+    first = weights(ours)
+    for _ in range(2):
+        ours.collect()
+    assert all(torch.equal(first[name], value) for name, value in weights(ours).items())
+    state.save(tmp_path, ours.state_dict(), Logs(tmp_path / "logs"))
+    resumed = learner(config=config)
+    resumed.load_state_dict(state.load(tmp_path, Logs(tmp_path / "logs")))
+    resumed.start(HandWritten())
+    for one in (ours, resumed):
+        one.collect()
+        newest = one._weights()
+        # the random start is forgotten
+        assert all(torch.equal(newest[name], value) for name, value in one._average.weights.items())
+    assert all(torch.equal(ours._weights()[name], value) for name, value in resumed._weights().items())
+    ours.collect()
+    assert not any(torch.equal(ours._weights()[name], value) for name, value in ours._average.weights.items())
+
+
 @pytest.mark.parametrize("more", [{}, {"quantiles": 5, "target_update_interval": 3, "ent_coef": "0.1"}])
 def test_a_resumed_learner_ends_with_the_same_weights_to_the_bit(
     tmp_path: Path, more: dict[str, Any]

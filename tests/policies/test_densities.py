@@ -9,6 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch import Tensor
+from torch.special import log_ndtr
 
 from irl.core.types import Transitions
 from irl.learners.ppo import PPOConfig, PPOLearner
@@ -17,6 +18,7 @@ from irl.policies import densities
 from tests import pointmass  # noqa: F401 (registers the tasks)
 
 LOW, HIGH = torch.tensor([-2.0]), torch.tensor([1.0])
+MOST = torch.finfo(torch.float32).max
 PPO = PPOConfig(n_envs=2, steps_per_round=128, batch_size=64, n_epochs=2, hidden=(16,))
 SAC = SACConfig(steps_per_round=100, learning_starts=60, batch_size=16, hidden=(16,))
 
@@ -60,6 +62,36 @@ def test_clipped_is_how_often_clipped_samples_fall_there() -> None:
     assert at_bound == pytest.approx(float((seen >= 1.0 - 3.0 * densities.EDGE).mean()), abs=0.01)
     near = float((np.abs(seen - 0.3) < 0.05).mean()) / 0.1
     assert float(clipped(torch.tensor([0.3]), mean, log_std).exp()) == pytest.approx(near, abs=0.02)
+
+
+@pytest.mark.parametrize("bounds", [(0.0, math.inf), (-math.inf, 2.0), (-MOST, MOST), (-math.inf, math.inf)])
+def test_clipped_is_the_density_itself_inside_a_box_without_end(bounds: tuple[float, float]) -> None:
+    action = torch.tensor([[0.3], [1.7]])
+    mean, log_std = torch.full((2, 1), 0.2, requires_grad=True), torch.full((2, 1), -0.7, requires_grad=True)
+    found = densities.clipped(action, mean, log_std, *(torch.tensor([bound]) for bound in bounds))
+    expected = torch.distributions.Normal(mean, log_std.exp()).log_prob(action).squeeze(1)
+    torch.testing.assert_close(found, expected)
+    slopes = torch.autograd.grad(found.sum(), (mean, log_std))
+    torch.testing.assert_close(slopes, torch.autograd.grad(expected.sum(), (mean, log_std)))
+
+
+def test_a_bound_there_is_has_its_mass_where_the_other_is_not_there() -> None:
+    low, high = torch.tensor([0.0]), torch.tensor([math.inf])
+    zero = torch.zeros(1, 1)
+    mass = densities.clipped(zero, zero - 0.5, zero, low, high)
+    assert float(mass) == pytest.approx(math.log(0.5 * math.erfc(-0.5 / math.sqrt(2.0))), abs=1e-6)
+
+
+def test_in_a_box_with_ends_clipped_is_its_equation_to_the_bit() -> None:
+    rng = torch.Generator().manual_seed(0)
+    mean, log_std, action = (scale * torch.randn(4000, 1, generator=rng) for scale in (3.0, 1.0, 2.0))
+    action = action.clamp(LOW, HIGH)
+    margin, std = densities.EDGE * (HIGH - LOW), log_std.exp()
+    low, high = LOW + margin, HIGH - margin
+    inside = -0.5 * ((action - mean) / std).square() - log_std - 0.5 * math.log(2.0 * math.pi)
+    at_low, at_high = log_ndtr((low - mean) / std), log_ndtr((mean - high) / std)
+    expected = torch.where(action <= low, at_low, torch.where(action >= high, at_high, inside)).squeeze(1)
+    assert torch.equal(densities.clipped(action, mean, log_std, LOW, HIGH), expected)
 
 
 def test_a_mean_far_outside_costs_no_log_density_at_the_bound() -> None:
