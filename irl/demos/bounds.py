@@ -8,6 +8,18 @@ FLOAT32_UNITS = 8
 """How far beyond a bound a number may lie, in float32's units of the bound's last place."""
 
 
+def action_outside(actions: Float[np.ndarray, "T A"], space: Box, taker: str) -> str | None:
+    """The first action outside what `taker` takes, in words; None where there is none."""
+    if (place := first_outside(actions, space)) is None:
+        return None
+    step, column = place
+    return (
+        f"the action {float(actions[place])!r} in column {column} at step {step}; {taker} takes "
+        f"{space.low[column]:g} to {space.high[column]:g}; record actions as the environment gets them, "
+        f"clipped"
+    )
+
+
 def first_outside(rows: Float[np.ndarray, "T D"], space: Box) -> tuple[int, int] | None:
     """Row and column of the first number outside the space, None where there is none."""
     low, high = space.low.astype(np.float64), space.high.astype(np.float64)

@@ -11,13 +11,13 @@ from gymnasium.spaces import Box
 from irl.core.errors import UserError
 from irl.core.rng import stream
 from irl.core.types import Episode
-from irl.demos.bounds import first_outside
+from irl.demos.bounds import action_outside
 from irl.demos.metadata import env_name
 from irl.demos.storage import open_dataset, read_episodes
 from irl.demos.write import origin_of
 from irl.envs.flatten import part_names
 from irl.envs.names import other_parts
-from irl.envs.tasks import task_of
+from irl.envs.tasks import known_apart
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,7 +129,7 @@ def check_task(demos: Demos, env: gym.Env, *, seen: bool = True) -> None:
             f"demonstrations of {shown} have observations of {has[0]} and actions of {has[1]}; "
             f"{wanted} has {needs[0]} and {needs[1]}"
         )
-    if shown != wanted and task_of(shown) is not None and task_of(wanted) is not None:
+    if known_apart(shown, wanted):
         raise UserError(
             f"demonstrations of {shown} are not of {wanted}, though both have observations of {has[0]} and "
             f"actions of {has[1]}"
@@ -165,11 +165,5 @@ def _check_actions(demos: Demos, wanted: str, space: gym.Space) -> None:
     assert isinstance(space, Box)
     indices = (*demos.indices, *demos.held_out_indices)
     for index, episode in zip(indices, (*demos.episodes, *demos.held_out), strict=True):
-        if (place := first_outside(episode.action, space)) is not None:
-            step, column = place
-            raise UserError(
-                f"demonstrations {demos.dataset_id}: episode {index} has the action "
-                f"{float(episode.action[place])!r} in column {column} at step {step}; {wanted} takes "
-                f"{space.low[column]:g} to {space.high[column]:g}; record actions as the environment gets "
-                f"them, clipped"
-            )
+        if said := action_outside(episode.action, space, wanted):
+            raise UserError(f"demonstrations {demos.dataset_id}: episode {index} has {said}")

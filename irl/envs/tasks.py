@@ -135,6 +135,16 @@ def task_of(env_id: str) -> Task | None:
     return next((task for task in TASKS if task.env_id == env_id.partition("?")[0]), None)
 
 
+def known_apart(a: str, b: str) -> bool:
+    """Whether both are rows of the table, and not the same: then equal sizes are chance.
+
+    So it is with Walker2d and HalfCheetah. What the environment is given does not matter; of a task that is
+    not in the table nothing is known.
+    """
+    first, second = task_of(a), task_of(b)
+    return first is not None and second is not None and first is not second
+
+
 def task_name(env_id: str) -> str:
     """The short name of an environment: `hopper` for `Hopper-v5`, `pendulum` for `Pendulum-v1`.
 

@@ -16,13 +16,13 @@ from irl.algorithms.loop import Round
 from irl.core.nets import fitted_normaliser
 from irl.core.rng import torch_stream
 from irl.core.types import Episode, Transitions, from_episodes
-from irl.demos.bounds import first_outside
+from irl.demos.bounds import action_outside
 from irl.demos.load import Demos
 from irl.discriminators.airl import AIRL, AIRLConfig
 from irl.discriminators.ensemble import Ensemble, one_or_several
 from irl.discriminators.gail import GAIL, GAILConfig
 from irl.envs.absorbing import absorb
-from irl.envs.tasks import task_of
+from irl.envs.tasks import known_apart
 from irl.learners.ready import ReadyPPO, ReadySAC, ready
 from irl.rewards.learned import LearnedReward, RewardSpec
 from irl.rewards.nets import SEES
@@ -132,21 +132,13 @@ def _check(model: Any, expert: Transitions, method: str, settings: GAILConfig | 
 
 def _check_demonstrations(model: Any, demos: Sequence[Episode]) -> None:
     """Refuse what `irl train` does: actions that the task does not take, and another task of its shapes."""
-    box = model.action_space
     for number, episode in enumerate(demos):
-        if (place := first_outside(episode.action, box)) is not None:
-            step, column = place
-            raise ValueError(
-                f"episode {number} of the demonstrations has the action {float(episode.action[place])!r} in "
-                f"column {column} at step {step}, the model takes {box.low[column]:g} to "
-                f"{box.high[column]:g}; record actions as the environment gets them, clipped"
-            )
+        if said := action_outside(episode.action, model.action_space, "the model"):
+            raise ValueError(f"episode {number} of the demonstrations has {said}")
     envs = model.get_env()
     spec = envs.get_attr("spec")[0] if envs is not None else None
     its = demos.env_id if isinstance(demos, Demos) else None
-    if spec is None or its is None or its == spec.id:
-        return
-    if task_of(its) is not None and task_of(spec.id) is not None:
+    if spec is not None and its is not None and known_apart(its, spec.id):
         raise ValueError(f"the demonstrations are of {its}, the model learns {spec.id}")
 
 

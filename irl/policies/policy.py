@@ -25,8 +25,7 @@ from irl.core import files
 from irl.core.config import from_json
 from irl.core.errors import UserError
 from irl.core.nets import CLIP
-from irl.envs.names import split_name
-from irl.envs.tasks import task_of
+from irl.envs.tasks import known_apart
 
 FORMAT, VERSION = "irl.policy", 1
 
@@ -197,11 +196,10 @@ def check_policy(policy: Policy, env: gym.Env) -> None:
             f"the policy of {policy.spec.env_id} takes observations of {has[0]} and gives actions of "
             f"{has[1]}; {wanted} has {needs[0]} and {needs[1]}: choose a policy of this task"
         )
-    its = split_name(policy.spec.env_id)[0]
-    if its != wanted and task_of(its) is not None and task_of(wanted) is not None:
+    if known_apart(policy.spec.env_id, wanted):
         raise UserError(
-            f"the policy is of {its}, which is not {wanted}, though both have observations of {has[0]} and "
-            f"actions of {has[1]}: choose a policy of this task"
+            f"the policy is of {policy.spec.env_id}, which is not {wanted}, though both have observations of "
+            f"{has[0]} and actions of {has[1]}: choose a policy of this task"
         )
 
 
