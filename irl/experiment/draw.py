@@ -130,8 +130,10 @@ def drawn_again(config: FromDemonstrations, folder: RunFolder, root: Path | None
     before = files.read_json(record)
     demos = _drawn_of(config, root or config.datasets_root)
     now = drawn(demos)
-    # an older record has no digest
-    if before != {key: value for key, value in now.items() if key in before or key != "sha256"}:
+    if isinstance(before, dict) and "sha256" not in before:
+        # an older record
+        del now["sha256"]
+    if before != now:
         raise UserError(
             f"{config.demos} in {demos.path} is not the dataset of {record}, which the run was begun with; "
             f"name the folder that holds it with --datasets-root, or set MINARI_DATASETS_PATH"
