@@ -47,9 +47,11 @@ SWITCHES: dict[str, str] = {
 """Words for `irl train`, by name."""
 OF_ONE = {
     "gail": {"unscaled": "--learner.reward-scaling none", "logit": f"{_D}reward-map logit"},
-    "dac": {"scaled": "--learner.reward-scaling std", "gail-map": f"{_D}reward-map gail"},
+    "dac": {"scaled": "--learner.reward-scaling std", "gail-map": f"{_D}reward-map gail", "td3": ""},
 }
 """The same, of settings whose defaults differ."""
+COMMANDS = {"td3": "dac-td3"}
+"""`irl train` commands of switches that are no words for a method's own."""
 
 
 @dataclass(frozen=True)
@@ -94,9 +96,10 @@ def cell(settings: Settings, method: str, task: str, switch: str) -> dict[str, A
     methods.demonstrations(task, root)
     run = settings.runs / f"{method}-{task_name(task)}-{switch}"
     steps, extra = _asked(settings, method, switch)
-    asked = methods.Settings(method, (task,), (settings.seed,), steps, extra)  # pyright: ignore[reportArgumentType]
+    command: Any = COMMANDS.get(switch, method)
+    asked = methods.Settings(command, (task,), (settings.seed,), steps, extra)
     given = ("--env-id", task, "--demo-episodes", "5", "--steps", str(steps), "--seed", str(settings.seed))
-    methods.begin_or_resume("train", run, method, *given, "--datasets-root", str(root), *shlex.split(extra))
+    methods.begin_or_resume("train", run, command, *given, "--datasets-root", str(root), *shlex.split(extra))
     methods.irl("evaluate", str(run))
     return {"switch": switch, **methods.result(asked, task, settings.seed, run)}
 
