@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from irl.bench.cells import Cell
+from irl.bench.cells import Cell, completed
 from irl.core.config import to_json
 from irl.core.differences import differences
 from irl.core.errors import UserError
@@ -18,7 +18,7 @@ Result = Mapping[str, Any]
 
 def changed(result: Result, cell: Cell) -> list[str]:
     """What the cell that a result is of and a cell of a grid disagree about."""
-    return differences(result.get("cell", {}), to_json(cell))
+    return differences(completed(result.get("cell", {}), cell), to_json(cell))
 
 
 def comparable(results: Sequence[Result], cells: Sequence[Cell]) -> tuple[list[Result], list[str]]:
@@ -42,10 +42,11 @@ def of_grid(results: Sequence[Result], cells: Sequence[Cell]) -> tuple[list[Resu
     for result in results:
         cell = named.get(Path(result["file"]).stem)
         why = ["the grid has no such cell"] if cell is None else changed(result, cell)
-        if why:
+        if why or cell is None:
             notes.append(f"{result['file']}: {'; '.join(why):.300}")
         else:
-            kept.append(result)
+            # nothing differs, so an older one is of all that the cell says
+            kept.append({**result, "cell": to_json(cell)})
     if not kept:
         raise UserError(
             f"no result is of a cell of grid {cells[0].grid} as it is now ({notes[0]}); run it again with "

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from irl.bench.cells import Cell, completed
+from irl.bench.cells import Cell
 from irl.core import files
 from irl.core.config import to_json
 from irl.core.errors import UserError
@@ -146,8 +146,7 @@ def read_results(folder: Path, cells: Sequence[Cell] = ()) -> list[dict[str, Any
     Raises:
         UserError: there is none, or one is damaged.
     """
-    named = {cell.name: cell for cell in cells}
-    found = [_read(path, named.get(path.stem)) for path in sorted(folder.glob("*.json"))]
+    found = [_read(path) for path in sorted(folder.glob("*.json"))]
     if not found:
         raise UserError(f"{folder} has no result yet; make them with: irl bench {folder.name}")
     order = {cell.name: i for i, cell in enumerate(cells)}
@@ -157,11 +156,10 @@ def read_results(folder: Path, cells: Sequence[Cell] = ()) -> list[dict[str, Any
 NEEDED = ("method", "task", "seed", "score", "curve", "wall_s")
 
 
-def _read(path: Path, cell: Cell | None) -> dict[str, Any]:
+def _read(path: Path) -> dict[str, Any]:
     content = files.read_json(path)
     if missing := [name for name in NEEDED if name not in (content if isinstance(content, dict) else {})]:
         raise UserError(f"{path} is no result of a cell: it lacks {', '.join(missing)}")
     # what was written before there were grids has other names for some
     older = {"commit": content.get("git_commit"), "versions": content.get("packages"), "demo_rate": 1}
-    said = {"cell": completed(content["cell"], cell)} if cell is not None and "cell" in content else {}
-    return {**older, "file": path.name, **content, **said}
+    return {**older, "file": path.name, **content}

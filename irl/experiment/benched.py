@@ -11,7 +11,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from irl.bench.cells import Cell, completed, expand, only
+from irl.bench.cells import Cell, expand, only
 from irl.bench.cluster import Cluster
 from irl.bench.comparable import changed
 from irl.bench.estimate import Cost, all_results, costs, makespan, measured
@@ -132,8 +132,7 @@ def _is_done(cell: Cell, folder: Path) -> bool:
     """
     if not (path := folder / f"{cell.name}.json").is_file():
         return False
-    written = files.read_json(path).get("cell", {})
-    if why := changed({"cell": completed(written, cell)}, cell):
+    if why := changed(files.read_json(path), cell):
         raise UserError(
             f"{path} is the result of another cell: {'; '.join(why):.300}; take it away, or give the "
             f"grid or the part another name"
